@@ -188,7 +188,7 @@ impl Geometry {
 }
 
 /// Appends an attribute of vertices to an array that stays empty until a mesh has the attribute.
-pub(super) fn extend<T: Clone>(
+pub(crate) fn extend<T: Clone>(
     all: &mut Vec<T>,
     own: &[T],
     first_vertex: usize,

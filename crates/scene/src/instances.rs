@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::{
     Geometry,
-    geometry::Dropped,
+    geometry::{Dropped, extend},
     instance::{Instance, bounds},
     mesh::Mesh,
     transform::Transform,
@@ -130,21 +130,14 @@ impl Geometry {
         self.normals.extend(mesh.normals.iter().map(normal));
         let count = self.positions.len();
         for (uvs, own) in self.uvs.iter_mut().zip(&mesh.uvs) {
-            super::geometry::extend(uvs, own, first, count, [0.0; 2], |&uv| uv);
+            extend(uvs, own, first, count, [0.0; 2], |&uv| uv);
         }
         let tangent = |&[x, y, z, sign]: &[f32; 4]| {
             let sign = if mirrors { -sign } else { sign };
             unit(map * Vec3::new(x, y, z).as_dvec3()).extend(sign).to_array()
         };
-        super::geometry::extend(
-            &mut self.tangents,
-            &mesh.tangents,
-            first,
-            count,
-            [0.0; 4],
-            tangent,
-        );
-        super::geometry::extend(&mut self.colors, &mesh.colors, first, count, [1.0; 4], |&c| c);
+        extend(&mut self.tangents, &mesh.tangents, first, count, [0.0; 4], tangent);
+        extend(&mut self.colors, &mesh.colors, first, count, [1.0; 4], |&c| c);
         let first = first as u32;
         self.triangles.extend(mesh.triangles.iter().map(|triangle| {
             let [a, b, c] = triangle.map(|corner| first + corner);

@@ -14,10 +14,11 @@ use std::{
 };
 
 use serde::Deserialize;
+use toml::Spanned;
 
 pub(crate) use lamp::{LampEntry, LampKindEntry};
 pub(crate) use material::{ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry};
-pub(crate) use portal::PortalEntry;
+pub(crate) use portal::PortalKeys;
 pub(crate) use value::{ChannelEntry, NumberOrVector, TextureEntry, Textured};
 
 use super::{
@@ -38,13 +39,13 @@ pub(crate) struct SceneFile {
     /// Every `[[lamp]]`, in file order.
     pub lamps: Vec<LampEntry>,
     /// Every `[[portal]]`, in file order.
-    pub portals: Vec<PortalEntry>,
+    pub portals: Vec<Entry<PortalKeys>>,
     /// Every `[[material]]`, in file order.
     pub materials: Vec<MaterialEntry>,
     /// Every `[[object]]`, in file order.
     pub objects: Vec<ObjectEntry>,
     /// Every `[[include]]`, in file order.
-    pub includes: Vec<IncludeEntry>,
+    pub includes: Vec<Entry<IncludeKeys>>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -116,35 +117,49 @@ fn default_environment_scale() -> f32 {
     1.0
 }
 
+/// Entry of an array of tables.
+#[derive(Debug)]
+pub(crate) struct Entry<T> {
+    /// Line of the entry, from 1.
+    pub line: usize,
+    pub keys: T,
+}
+
 #[derive(Debug)]
 pub(crate) struct ObjectEntry {
     /// Line of the entry, from 1.
     pub line: usize,
-    /// Name, for messages.
-    pub name: Option<String>,
-    /// Material; optional where the mesh file brings its own colours.
-    pub material: Option<String>,
-    /// Factor along each axis, applied first.
-    pub scale: [f32; 3],
-    /// Rotations about X, then Y, then Z, degrees.
-    pub rotate_deg: [f32; 3],
-    /// Translation, metres, applied last.
-    pub translate: [f32; 3],
+    /// Keys of every object, without `mesh` and `shape`.
+    pub keys: ObjectKeys,
     /// Source of its triangles.
     pub source: ObjectSource,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ObjectKeys {
+    /// Name, for messages.
+    pub name: Option<String>,
+    /// PLY, OBJ, glTF or GLB file; this or `shape`.
+    pub mesh: Option<PathBuf>,
+    pub shape: Option<Spanned<String>>,
+    /// Name of a material; may be absent where the mesh file brings its own.
+    pub material: Option<String>,
+    /// Factor along each axis, or one for all; applied first.
+    #[serde(default)]
+    pub scale: NumberOrVector,
+    /// Rotations about X, then Y, then Z, degrees.
+    #[serde(default)]
+    pub rotate_deg: [f32; 3],
+    /// Translation, metres, applied last.
+    #[serde(default)]
+    pub translate: [f32; 3],
 }
 
 #[derive(Debug)]
 pub(crate) enum ObjectSource {
     Mesh(PathBuf),
     Shape { name: String, shape: Box<dyn Shape> },
-}
-
-#[derive(Debug)]
-pub(crate) struct IncludeEntry {
-    /// Line of the entry, from 1.
-    pub line: usize,
-    pub keys: IncludeKeys,
 }
 
 #[derive(Debug, Deserialize)]

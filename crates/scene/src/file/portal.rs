@@ -2,13 +2,6 @@
 
 use serde::Deserialize;
 
-#[derive(Clone, Debug)]
-pub(crate) struct PortalEntry {
-    /// Line of the entry, from 1.
-    pub line: usize,
-    pub keys: PortalKeys,
-}
-
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PortalKeys {

@@ -3,7 +3,7 @@
 //! Materials and objects are tagged by `type` and `shape`. Their tables are split into the keys
 //! that all kinds share and the keys of one kind, so that a key of another kind is rejected too.
 
-use std::{ops::Range, path::PathBuf};
+use std::ops::Range;
 
 use serde::{
     Deserialize, Deserializer,
@@ -16,36 +16,14 @@ use toml::{
 };
 
 use super::{
-    CameraEntry, EnvironmentEntry, IncludeEntry, KeyframeEntry, LampEntry, LampKindEntry,
-    MaterialEntry, MaterialKeys, MaterialKindEntry, NumberOrVector, ObjectEntry, ObjectSource,
-    PortalEntry, SceneFile,
+    CameraEntry, Entry, EnvironmentEntry, LampEntry, LampKindEntry, MaterialEntry, MaterialKeys,
+    MaterialKindEntry, ObjectEntry, ObjectKeys, ObjectSource, SceneFile,
 };
 use crate::{
     FilmSettings,
     error::{Result, TextError, line_and_column},
     shapes::{self, Shape},
 };
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ObjectKeys {
-    /// Name, for messages.
-    name: Option<String>,
-    /// PLY, OBJ, glTF or GLB file; this or `shape`.
-    mesh: Option<PathBuf>,
-    shape: Option<Spanned<String>>,
-    /// Name of a material; may be absent where the mesh file brings its own.
-    material: Option<String>,
-    /// Factor along each axis, or one for all; applied first.
-    #[serde(default)]
-    scale: NumberOrVector,
-    /// Rotations about X, then Y, then Z, degrees.
-    #[serde(default)]
-    rotate_deg: [f32; 3],
-    /// Translation, metres, applied last.
-    #[serde(default)]
-    translate: [f32; 3],
-}
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -85,14 +63,16 @@ pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
     let root_keys: RootKeys = read_table(table, span)?;
     Ok(SceneFile {
         camera: root_keys.camera,
-        keyframes: read_all(keyframes, text, read_keyframe)?,
+        keyframes: read_all(keyframes, text, |entry, text| {
+            Ok(read_plain(entry, text, "[[camera.keyframe]]")?.keys)
+        })?,
         film: root_keys.film,
         environment: root_keys.environment,
         lamps: read_all(lamps, text, read_lamp)?,
-        portals: read_all(portals, text, read_portal)?,
+        portals: read_all(portals, text, |e, text| read_plain(e, text, "[[portal]]"))?,
         materials: read_all(materials, text, read_material)?,
         objects: read_all(objects, text, read_object)?,
-        includes: read_all(includes, text, read_include)?,
+        includes: read_all(includes, text, |e, text| read_plain(e, text, "[[include]]"))?,
     })
 }
 
@@ -123,26 +103,7 @@ fn read_material(entry: Spanned<DeValue>, text: &str) -> Result<MaterialEntry, T
     let (keys, rest): (MaterialKeys, _) = KindTable::split(entry, "[[material]]")?;
     let type_name = keys.r#type.get_ref();
     let owner = format!("material `{}` of type `{type_name}`", keys.name);
-    let kind = match type_name.as_str() {
-        "diffuse" => MaterialKindEntry::Diffuse(rest.read(&owner)?),
-        "plastic" => MaterialKindEntry::Plastic(rest.read(&owner)?),
-        "conductor" => MaterialKindEntry::Conductor(rest.read(&owner)?),
-        "principled" => MaterialKindEntry::Principled(rest.read(&owner)?),
-        "mirror" => MaterialKindEntry::Mirror(rest.read(&owner)?),
-        "dielectric" => MaterialKindEntry::Dielectric(rest.read(&owner)?),
-        "thin_dielectric" => MaterialKindEntry::ThinDielectric(rest.read(&owner)?),
-        "measured" => MaterialKindEntry::Measured(rest.read(&owner)?),
-        unknown => {
-            return Err(TextError {
-                span: keys.r#type.span(),
-                message: format!(
-                    "unknown material type `{unknown}`, expected one of `diffuse`, `plastic`, \
-                     `conductor`, `principled`, `mirror`, `dielectric`, `thin_dielectric`, \
-                     `measured`"
-                ),
-            });
-        }
-    };
+    let kind = rest.read_kind("material type", &keys.r#type, MATERIALS, &owner)?;
     Ok(MaterialEntry { line, keys, kind })
 }
 
@@ -152,61 +113,36 @@ fn read_lamp(entry: Spanned<DeValue>, text: &str) -> Result<LampEntry, TextError
     let type_name = keys.r#type.get_ref();
     let label = keys.name.as_ref().map_or("lamp".to_owned(), |name| format!("lamp `{name}`"));
     let owner = format!("{label} of type `{type_name}`");
-    let kind = match type_name.as_str() {
-        "point" => LampKindEntry::Point(rest.read(&owner)?),
-        "spot" => LampKindEntry::Spot(rest.read(&owner)?),
-        "directional" => LampKindEntry::Directional(rest.read(&owner)?),
-        unknown => {
-            return Err(TextError {
-                span: keys.r#type.span(),
-                message: format!(
-                    "unknown lamp type `{unknown}`, expected one of `point`, `spot`, `directional`"
-                ),
-            });
-        }
-    };
+    let kind = rest.read_kind("lamp type", &keys.r#type, LAMPS, &owner)?;
     Ok(LampEntry { line, name: keys.name, kind })
 }
 
-fn read_portal(entry: Spanned<DeValue>, text: &str) -> Result<PortalEntry, TextError> {
-    let (line, keys) = read_plain(entry, text, "[[portal]]")?;
-    Ok(PortalEntry { line, keys })
-}
-
-fn read_include(entry: Spanned<DeValue>, text: &str) -> Result<IncludeEntry, TextError> {
-    let (line, keys) = read_plain(entry, text, "[[include]]")?;
-    Ok(IncludeEntry { line, keys })
-}
-
-fn read_keyframe(entry: Spanned<DeValue>, text: &str) -> Result<KeyframeEntry, TextError> {
-    Ok(read_plain(entry, text, "[[camera.keyframe]]")?.1)
-}
-
-/// Reads an entry of an array of tables that has no kinds, with its line; `header` names it.
+/// Reads an entry of an array of tables that has no kinds; `header` names it.
 fn read_plain<T: DeserializeOwned>(
     entry: Spanned<DeValue>,
     text: &str,
     header: &str,
-) -> Result<(usize, T), TextError> {
+) -> Result<Entry<T>, TextError> {
     let span = entry.span();
     let line = line_and_column(text, span.start).0;
     let DeValue::Table(table) = entry.into_inner() else {
         return Err(TextError { span, message: format!("expected a table, `{header}`") });
     };
-    Ok((line, read_table(table, span)?))
+    Ok(Entry { line, keys: read_table(table, span)? })
 }
 
 fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextError> {
     let line = line_and_column(text, entry.span().start).0;
-    let (keys, rest): (ObjectKeys, _) = KindTable::split(entry, "[[object]]")?;
+    let (mut keys, rest): (ObjectKeys, _) = KindTable::split(entry, "[[object]]")?;
     let label = keys.name.as_ref().map_or("object".to_owned(), |name| format!("object `{name}`"));
-    let source = match (keys.mesh, keys.shape) {
+    let source = match (keys.mesh.take(), keys.shape.take()) {
         (Some(mesh), None) => {
             refuse_unknown_keys(&rest.table, rest.shared_keys, &format!("{label} with a mesh"))?;
             ObjectSource::Mesh(mesh)
         }
         (None, Some(shape)) => {
-            let parameters = read_shape(&shape, rest, &label)?;
+            let owner = format!("{label} of shape `{}`", shape.get_ref());
+            let parameters = rest.read_kind("shape", &shape, SHAPES, &owner)?;
             ObjectSource::Shape { name: shape.into_inner(), shape: parameters }
         }
         (found_mesh, _) => {
@@ -217,44 +153,47 @@ fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextE
             });
         }
     };
-    Ok(ObjectEntry {
-        line,
-        name: keys.name,
-        material: keys.material,
-        scale: keys.scale.0,
-        rotate_deg: keys.rotate_deg,
-        translate: keys.translate,
-        source,
-    })
+    Ok(ObjectEntry { line, keys, source })
 }
 
-fn read_shape(
-    name: &Spanned<String>,
+/// Readers of the kinds of an entry, by name.
+type Kinds<T> = [(&'static str, fn(KindTable, &str) -> Result<T, TextError>)];
+
+const MATERIALS: &Kinds<MaterialKindEntry> = &[
+    ("diffuse", |rest, owner| Ok(MaterialKindEntry::Diffuse(rest.read(owner)?))),
+    ("plastic", |rest, owner| Ok(MaterialKindEntry::Plastic(rest.read(owner)?))),
+    ("conductor", |rest, owner| Ok(MaterialKindEntry::Conductor(rest.read(owner)?))),
+    ("principled", |rest, owner| Ok(MaterialKindEntry::Principled(rest.read(owner)?))),
+    ("mirror", |rest, owner| Ok(MaterialKindEntry::Mirror(rest.read(owner)?))),
+    ("dielectric", |rest, owner| Ok(MaterialKindEntry::Dielectric(rest.read(owner)?))),
+    ("thin_dielectric", |rest, owner| Ok(MaterialKindEntry::ThinDielectric(rest.read(owner)?))),
+    ("measured", |rest, owner| Ok(MaterialKindEntry::Measured(rest.read(owner)?))),
+];
+
+const LAMPS: &Kinds<LampKindEntry> = &[
+    ("point", |rest, owner| Ok(LampKindEntry::Point(rest.read(owner)?))),
+    ("spot", |rest, owner| Ok(LampKindEntry::Spot(rest.read(owner)?))),
+    ("directional", |rest, owner| Ok(LampKindEntry::Directional(rest.read(owner)?))),
+];
+
+const SHAPES: &Kinds<Box<dyn Shape>> = &[
+    ("box", read_shape::<shapes::RoundedBox>),
+    ("sphere", read_shape::<shapes::Sphere>),
+    ("cylinder", read_shape::<shapes::Cylinder>),
+    ("cone", read_shape::<shapes::Cone>),
+    ("torus", read_shape::<shapes::Torus>),
+    ("lathe", read_shape::<shapes::Lathe>),
+    ("extrude", read_shape::<shapes::Extrude>),
+    ("tube", read_shape::<shapes::Tube>),
+    ("blobs", read_shape::<shapes::Blobs>),
+    ("grid", read_shape::<shapes::Grid>),
+];
+
+fn read_shape<S: Shape + DeserializeOwned + 'static>(
     rest: KindTable,
-    label: &str,
+    owner: &str,
 ) -> Result<Box<dyn Shape>, TextError> {
-    let owner = format!("{label} of shape `{}`", name.get_ref());
-    Ok(match name.get_ref().as_str() {
-        "box" => Box::new(rest.read::<shapes::RoundedBox>(&owner)?),
-        "sphere" => Box::new(rest.read::<shapes::Sphere>(&owner)?),
-        "cylinder" => Box::new(rest.read::<shapes::Cylinder>(&owner)?),
-        "cone" => Box::new(rest.read::<shapes::Cone>(&owner)?),
-        "torus" => Box::new(rest.read::<shapes::Torus>(&owner)?),
-        "lathe" => Box::new(rest.read::<shapes::Lathe>(&owner)?),
-        "extrude" => Box::new(rest.read::<shapes::Extrude>(&owner)?),
-        "tube" => Box::new(rest.read::<shapes::Tube>(&owner)?),
-        "blobs" => Box::new(rest.read::<shapes::Blobs>(&owner)?),
-        "grid" => Box::new(rest.read::<shapes::Grid>(&owner)?),
-        unknown => {
-            return Err(TextError {
-                span: name.span(),
-                message: format!(
-                    "unknown shape `{unknown}`, expected one of `box`, `sphere`, `cylinder`, \
-                     `cone`, `torus`, `lathe`, `extrude`, `tube`, `blobs`, `grid`"
-                ),
-            });
-        }
-    })
+    Ok(Box::new(rest.read::<S>(owner)?))
 }
 
 /// Keys of one kind of material or shape, beside those that all kinds share.
@@ -282,6 +221,23 @@ impl KindTable<'_> {
             if is_shared { &mut shared } else { &mut table }.insert(key, value);
         }
         Ok((read_table(shared, span.clone())?, KindTable { table, span, shared_keys }))
+    }
+
+    /// Reads the keys of the kind `name` among `kinds`; `what` and `owner` name it in messages.
+    fn read_kind<T>(
+        self,
+        what: &str,
+        name: &Spanned<String>,
+        kinds: &Kinds<T>,
+        owner: &str,
+    ) -> Result<T, TextError> {
+        if let Some((_, read)) = kinds.iter().find(|(known, _)| known == name.get_ref()) {
+            return read(self, owner);
+        }
+        let known: Vec<_> = kinds.iter().map(|(known, _)| format!("`{known}`")).collect();
+        let (name, span, known) = (name.get_ref(), name.span(), known.join(", "));
+        let message = format!("unknown {what} `{name}`, expected one of {known}");
+        Err(TextError { span, message })
     }
 
     /// Reads the keys of the kind `T`; `owner` names it in messages.

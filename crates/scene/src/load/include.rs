@@ -9,12 +9,12 @@ use crate::{
     Geometry, Lamp,
     error::Result,
     features,
-    file::{IncludeEntry, IncludeKeys},
+    file::{Entry, IncludeKeys},
     import::Imported,
     instance::{Budget, Instance},
     lamp::LampKind,
     material::{Material, MaterialKind},
-    mesh::{Mesh, ObjectStart},
+    mesh::Mesh,
     transform::Transform,
 };
 
@@ -23,7 +23,7 @@ impl Loader<'_> {
     /// entry replaces; returns its lamps.
     pub(super) fn include(
         &self,
-        entry: &IncludeEntry,
+        entry: &Entry<IncludeKeys>,
         materials: &mut Vec<Material>,
         geometry: &mut Geometry,
         inputs: &mut Vec<PathBuf>,
@@ -33,7 +33,7 @@ impl Loader<'_> {
         let label = format!("include {} (line {})", file.display(), entry.line);
         self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
         let path = self.folder.join(file);
-        let Contents { materials: own_materials, geometry: placed, lamps } =
+        let Contents { materials: own_materials, geometry: mut placed, lamps } =
             self.contents(&label, &path, inputs, warnings)?;
         for name in replaced.keys() {
             let is_there = own_materials.iter().any(|material| material.name == *name);
@@ -68,36 +68,25 @@ impl Loader<'_> {
         self.check_counts(vertices, triangles)?;
         let first_vertex = geometry.positions.len();
         let count = placed.triangle_count() as usize;
-        let Geometry {
-            positions,
-            normals,
-            uvs,
-            tangents,
-            colors,
-            triangles,
-            materials: of,
-            mut objects,
-            prototypes,
-            instances,
-        } = placed;
         let emits: Vec<bool> =
             materials.iter().map(|material| material.surface.emission.is_some()).collect();
         let moved = Moved { transform: &transform, places: &places, emits: &emits };
-        for start in &mut objects {
+        for start in &mut placed.objects {
             start.name = format!("{stem}/{}", start.name);
         }
-        self.include_instances(&label, geometry, prototypes, (&instances, &objects), &moved)?;
+        self.include_instances(&label, geometry, &mut placed, &moved)?;
         let mesh = Mesh {
-            positions,
-            normals,
-            uvs,
-            tangents,
-            colors,
-            triangles,
-            objects,
+            positions: placed.positions,
+            normals: placed.normals,
+            uvs: placed.uvs,
+            tangents: placed.tangents,
+            colors: placed.colors,
+            triangles: placed.triangles,
+            objects: placed.objects,
             ..Mesh::default()
         };
-        let dropped = geometry.append(&mesh, &transform, |index| places[of[index] as usize]);
+        let of = |index: usize| places[placed.materials[index] as usize];
+        let dropped = geometry.append(&mesh, &transform, of);
         let positions = geometry.positions[first_vertex..].iter().copied().map(Vec3::from);
         self.check_extent(&label, positions)?;
         warnings.extend(dropped.warnings(&label, count));
@@ -114,16 +103,15 @@ impl Loader<'_> {
         &self,
         label: &str,
         geometry: &mut Geometry,
-        prototypes: Vec<Geometry>,
-        (instances, objects): (&[Instance], &[ObjectStart]),
+        placed: &mut Geometry,
         moved: &Moved<'_>,
     ) -> Result<()> {
         let Moved { transform, places, emits } = *moved;
         let first_prototype = geometry.prototypes.len() as u32;
-        geometry.prototypes.extend(prototypes);
+        geometry.prototypes.append(&mut placed.prototypes);
         let boxes = geometry.prototypes();
-        let mut objects = objects.iter().peekable();
-        for (index, instance) in instances.iter().enumerate() {
+        let mut objects = placed.objects.iter().peekable();
+        for (index, instance) in placed.instances.iter().enumerate() {
             while let Some(object) = objects.next_if(|start| start.first_instance <= index) {
                 geometry.start_object(&object.name);
             }

@@ -12,7 +12,7 @@ use crate::{
     Geometry,
     error::{Error, Result},
     features::{self, Ignored},
-    file::{ObjectEntry, ObjectSource},
+    file::{ObjectEntry, ObjectKeys, ObjectSource},
     geometry::MAX_COORDINATE,
     instance::{Budget, Instance},
     instances::Prototype,
@@ -41,33 +41,27 @@ impl Loader<'_> {
         let mut uses: HashMap<PathBuf, usize> = HashMap::new();
         for (index, object) in objects.iter().enumerate() {
             let label = object_label(index, object);
-            if let Some(name) = &object.name
+            if let Some(name) = &object.keys.name
                 && let Some(first) = named.insert(name, object.line)
             {
                 return Err(
                     self.error(format!("{label}: the name is taken by the object of line {first}"))
                 );
             }
-            self.check_placement(&label, object)?;
+            let ObjectKeys { scale, rotate_deg, translate, .. } = &object.keys;
+            self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
             self.check_material(&label, object, materials)?;
             *uses.entry(self.mesh_key(object)).or_default() += 1;
         }
-        let lacks_material = |object: &&ObjectEntry| object.material.is_none();
-        let own_materials: HashSet<PathBuf> =
-            objects.iter().filter(lacks_material).map(|object| self.mesh_key(object)).collect();
+        let keys = |is_asked: &dyn Fn(Option<&Material>) -> bool| -> HashSet<PathBuf> {
+            let asked = objects.iter().filter(|object| is_asked(named_material(object, materials)));
+            asked.map(|object| self.mesh_key(object)).collect()
+        };
+        let own_materials = keys(&|named| named.is_none());
         // Shapes without textures need no texture coordinates, and their scenes keep their hashes.
-        let textured: HashSet<PathBuf> = objects
-            .iter()
-            .filter(|object| is_textured(object, materials))
-            .map(|object| self.mesh_key(object))
-            .collect();
-        let colored: HashSet<PathBuf> = objects
-            .iter()
-            .filter(|object| {
-                named_material(object, materials).is_some_and(|own| own.surface.vertex_color)
-            })
-            .map(|object| self.mesh_key(object))
-            .collect();
+        let textured =
+            keys(&|named| named.is_some_and(|own| own.surface.textures().next().is_some()));
+        let colored = keys(&|named| named.is_some_and(|own| own.surface.vertex_color));
         // Read all meshes before placing any, so that the arrays are allocated once.
         let mut meshes = HashMap::new();
         let mut shape_triangles = 0;
@@ -190,10 +184,6 @@ impl Loader<'_> {
         check_triangles(triangles).map_err(|message| self.error(format!("{}: {message}", label())))
     }
 
-    fn check_placement(&self, label: &str, object: &ObjectEntry) -> Result<()> {
-        self.check_transform(label, object.scale, object.rotate_deg, object.translate)
-    }
-
     pub(super) fn check_transform(
         &self,
         label: &str,
@@ -230,7 +220,7 @@ impl Loader<'_> {
         object: &ObjectEntry,
         materials: &[Material],
     ) -> Result<()> {
-        match &object.material {
+        match &object.keys.material {
             Some(name) => self.material_index(label, name, materials).map(drop),
             None => self.check(matches!(object.source, ObjectSource::Mesh(_)), || {
                 format!("{label}: expected a material, found none")
@@ -282,13 +272,12 @@ impl Loader<'_> {
         materials: &mut Vec<Material>,
         warnings: &mut Vec<String>,
     ) -> Result<()> {
-        geometry.start_object(object.name.as_deref().unwrap_or(label));
-        let transform = Transform::new(object.scale, object.rotate_deg, object.translate);
+        geometry.start_object(object.keys.name.as_deref().unwrap_or(label));
+        let transform =
+            Transform::new(object.keys.scale.0, object.keys.rotate_deg, object.keys.translate);
         let first_vertex = geometry.positions.len();
-        let named = object
-            .material
-            .as_ref()
-            .and_then(|name| materials.iter().position(|material| material.name == *name));
+        let is_named = |material: &Material| Some(&material.name) == object.keys.material.as_ref();
+        let named = materials.iter().position(is_named);
         let first_own = materials.len();
         if named.is_none() {
             let colored =
@@ -299,7 +288,7 @@ impl Loader<'_> {
                      to every triangle"
                 )
             })?;
-            let object = object.name.as_deref().unwrap_or("mesh");
+            let object = object.keys.name.as_deref().unwrap_or("mesh");
             materials.extend(mesh.materials.iter().map(|MeshMaterial { material, .. }| {
                 let name = format!("{object}/{}", material.name);
                 Material { name, ..material.clone() }
@@ -338,17 +327,13 @@ impl Loader<'_> {
 
 /// Material of a triangle among those of its mesh file.
 fn run_material(mesh: &Mesh, triangle: usize) -> usize {
-    let run = mesh.runs.partition_point(|run| run.first_triangle <= triangle);
-    run.checked_sub(1).and_then(|run| mesh.runs[run].material).unwrap_or(0)
+    mesh.material_of(triangle).unwrap_or(0)
 }
 
 /// Tests whether an object emits light: then it is placed, since lamps are triangles in the world.
 fn emits(object: &ObjectEntry, mesh: &Mesh, materials: &[Material]) -> bool {
-    match &object.material {
-        Some(name) => materials
-            .iter()
-            .find(|material| material.name == *name)
-            .is_some_and(|material| material.surface.emission.is_some()),
+    match named_material(object, materials) {
+        Some(material) => material.surface.emission.is_some(),
         None => mesh.materials.iter().any(|own| own.material.surface.emission.is_some()),
     }
 }
@@ -380,14 +365,8 @@ fn ignored_in_object(mesh: &Mesh, own_materials: bool) -> Ignored {
     ignored
 }
 
-/// Tests whether an object names a material with textures.
-fn is_textured(object: &ObjectEntry, materials: &[Material]) -> bool {
-    named_material(object, materials)
-        .is_some_and(|material| material.surface.textures().next().is_some())
-}
-
 fn named_material<'a>(object: &ObjectEntry, materials: &'a [Material]) -> Option<&'a Material> {
-    materials.iter().find(|material| Some(&material.name) == object.material.as_ref())
+    materials.iter().find(|material| Some(&material.name) == object.keys.material.as_ref())
 }
 
 /// Label of an object in messages: name or number, source and line.
@@ -396,7 +375,7 @@ fn object_label(index: usize, object: &ObjectEntry) -> String {
         ObjectSource::Mesh(mesh) => mesh.display().to_string(),
         ObjectSource::Shape { name, .. } => name.clone(),
     };
-    match &object.name {
+    match &object.keys.name {
         Some(name) => format!("object `{name}` ({source}, line {})", object.line),
         None => format!("object {index} ({source}, line {})", object.line),
     }

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::Loader;
 use crate::{
     error::Result,
-    file::PortalEntry,
+    file::{Entry, PortalKeys},
     portal::{MAX_PORTALS, Portal},
 };
 
@@ -17,7 +17,7 @@ const RIGHT_ANGLE: f32 = 1e-3;
 
 impl Loader<'_> {
     /// Checks the portals of a scene file.
-    pub(super) fn portals(&self, entries: &[PortalEntry]) -> Result<Vec<Portal>> {
+    pub(super) fn portals(&self, entries: &[Entry<PortalKeys>]) -> Result<Vec<Portal>> {
         self.check(entries.len() <= MAX_PORTALS, || {
             format!(
                 "expected at most {MAX_PORTALS} `[[portal]]`, found {}: join those of one wall",
@@ -27,7 +27,7 @@ impl Loader<'_> {
         entries.iter().enumerate().map(|(index, entry)| self.portal(index, entry)).collect()
     }
 
-    fn portal(&self, index: usize, entry: &PortalEntry) -> Result<Portal> {
+    fn portal(&self, index: usize, entry: &Entry<PortalKeys>) -> Result<Portal> {
         let keys = &entry.keys;
         let label = match &keys.name {
             Some(name) => format!("portal `{name}` (line {})", entry.line),

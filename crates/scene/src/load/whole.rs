@@ -150,9 +150,7 @@ impl Loader<'_> {
         let transform = Transform::new([1.0; 3], [0.0; 3], [0.0; 3]);
         geometry.start_object(&self.path.file_stem().unwrap_or_default().to_string_lossy());
         let dropped = geometry.append(mesh, &transform, |triangle| {
-            let next = mesh.runs.partition_point(|run| run.first_triangle <= triangle);
-            let run = next.checked_sub(1).and_then(|run| mesh.runs[run].material);
-            run.unwrap_or(lacking) as u32
+            mesh.material_of(triangle).unwrap_or(lacking) as u32
         });
         let mut dropped_of_repeated = DroppedOfMany::default();
         for repeated in &mesh.repeated {
@@ -215,27 +213,23 @@ impl Loader<'_> {
             return Err(self.error("expected triangles or a camera, found neither"));
         };
         if let Some(View { from, at }) = inside::view(geometry, low, high) {
-            let entry = CameraEntry {
-                position: from.to_array(),
-                look_at: at.to_array(),
-                up: [0.0, 1.0, 0.0],
-                vertical_fov_deg: INSIDE_FOV_DEG,
-                aperture_radius: 0.0,
-                focus_distance: None,
-            };
-            return Ok((entry, "stands in the room"));
+            return Ok((pinhole(from, at, Vec3::Y, INSIDE_FOV_DEG), "stands in the room"));
         }
         let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low).length());
         let distance = radius / (0.5 * FRAMING_FOV_DEG).to_radians().sin();
-        let entry = CameraEntry {
-            position: (centre + distance * FRAMING_DIRECTION.normalize()).to_array(),
-            look_at: centre.to_array(),
-            up: [0.0, 1.0, 0.0],
-            vertical_fov_deg: FRAMING_FOV_DEG,
-            aperture_radius: 0.0,
-            focus_distance: None,
-        };
-        Ok((entry, "frames the bounding box"))
+        let position = centre + distance * FRAMING_DIRECTION.normalize();
+        Ok((pinhole(position, centre, Vec3::Y, FRAMING_FOV_DEG), "frames the bounding box"))
+    }
+}
+
+fn pinhole(position: Vec3, look_at: Vec3, up: Vec3, vertical_fov_deg: f32) -> CameraEntry {
+    CameraEntry {
+        position: position.to_array(),
+        look_at: look_at.to_array(),
+        up: up.to_array(),
+        vertical_fov_deg,
+        aperture_radius: 0.0,
+        focus_distance: None,
     }
 }
 
@@ -246,14 +240,8 @@ fn camera_entry(camera: &MeshCamera, lens: Perspective) -> CameraEntry {
     // Look at a point so far away that single precision keeps the direction.
     let distance = position.length().max(1.0);
     let forward = matrix.transform_vector3(Vec3::NEG_Z).normalize_or_zero();
-    CameraEntry {
-        position: position.to_array(),
-        look_at: (position + distance * forward).to_array(),
-        up: matrix.transform_vector3(Vec3::Y).normalize_or_zero().to_array(),
-        vertical_fov_deg: lens.vertical_fov_rad.to_degrees(),
-        aperture_radius: 0.0,
-        focus_distance: None,
-    }
+    let up = matrix.transform_vector3(Vec3::Y).normalize_or_zero();
+    pinhole(position, position + distance * forward, up, lens.vertical_fov_rad.to_degrees())
 }
 
 /// Checks that a mesh file is one that [`Loader::whole`] reads.

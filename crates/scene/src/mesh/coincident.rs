@@ -80,7 +80,8 @@ impl Mesh {
         }
     }
 
-    fn material_of(&self, triangle: usize) -> Option<usize> {
+    /// Index into [`Mesh::materials`] of the material of a triangle, if it has one.
+    pub(crate) fn material_of(&self, triangle: usize) -> Option<usize> {
         let next = self.runs.partition_point(|run| run.first_triangle <= triangle);
         self.runs[..next].last().and_then(|run: &MaterialRun| run.material)
     }

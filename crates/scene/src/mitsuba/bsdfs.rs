@@ -85,7 +85,7 @@ impl Model {
     }
 }
 
-impl Reader<'_> {
+impl Reader {
     /// Reads a reflection model and those in it.
     pub(super) fn model(&mut self, node: Node<'_>) -> Result<Model> {
         self.nested(node, MAX_DEPTH)

@@ -14,7 +14,7 @@ use crate::{
     features,
 };
 
-impl Reader<'_> {
+impl Reader {
     /// Reads the emitter as a map.
     pub(super) fn daylight(&mut self, parameters: &Parameters<'_>) -> Result<EnvironmentMap> {
         let node = parameters.node;

@@ -18,7 +18,7 @@ use crate::{
     material::Emission,
 };
 
-impl Reader<'_> {
+impl Reader {
     /// Reads an emitter that belongs to no shape.
     pub(super) fn emitter(&mut self, node: Node<'_>) -> Result<()> {
         let parameters = Parameters::new(node);

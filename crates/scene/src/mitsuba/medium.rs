@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{error::Result, features, material::MaterialKind};
 
-impl Reader<'_> {
+impl Reader {
     /// Lets a dielectric absorb as the medium inside it does; names a medium that scatters, or that
     /// another surface bounds.
     pub(super) fn fill(&mut self, kind: &mut MaterialKind, medium: Node<'_>) -> Result<()> {

@@ -21,7 +21,7 @@ use crate::{
     math::colour::luminance,
 };
 
-impl Reader<'_> {
+impl Reader {
     /// Mixture of two models: an opacity if one of them is `null`, else the greater of them if they do
     /// not mix.
     pub(super) fn blend(

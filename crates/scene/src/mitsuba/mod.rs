@@ -44,8 +44,8 @@ use crate::{
 };
 
 /// Scene on its way from the document.
-struct Reader<'a> {
-    document: &'a Document,
+#[derive(Default)]
+struct Reader {
     textures: TextureCache,
     environment: Option<EnvironmentMap>,
     lamps: Vec<Lamp>,
@@ -75,24 +75,7 @@ struct Reader<'a> {
 /// readers of meshes, images and maps.
 pub(crate) fn read(path: &Path, camera: Option<&str>, folder: Folder) -> Result<Imported> {
     let document = Document::read(path, folder)?;
-    let mut reader = Reader {
-        document: &document,
-        textures: TextureCache::default(),
-        environment: None,
-        lamps: Vec::new(),
-        materials: Vec::new(),
-        material_numbers: HashMap::new(),
-        geometry: Geometry::default(),
-        shapes: HashMap::new(),
-        prototypes: HashMap::new(),
-        budget: Budget::default(),
-        repeated_triangles: 0,
-        inputs: document.files.clone(),
-        asked: Asked::default(),
-        ignored: Ignored::default(),
-        dropped: DroppedOfMany::default(),
-        warnings: Vec::new(),
-    };
+    let mut reader = Reader { inputs: document.files.clone(), ..Reader::default() };
     reader.textures.load_early(document.images());
     let mut sensors = Vec::new();
     for node in document.root().children() {
@@ -110,7 +93,7 @@ pub(crate) fn read(path: &Path, camera: Option<&str>, folder: Folder) -> Result<
             }
         }
     }
-    let (camera, film) = reader.sensor(&sensors, camera)?;
+    let (camera, film) = reader.sensor(document.root(), &sensors, camera)?;
     if reader.materials.is_empty() {
         let Model { kind, surface } = Model::default_of_shapes();
         reader.materials.push(Material { name: "default".into(), kind, surface });

@@ -15,7 +15,7 @@ use crate::{
 const WITHOUT_COUNTERPART: [&str; 5] =
     ["anisotropic", "spec_tint", "sheen", "flatness", "clearcoat"];
 
-impl Reader<'_> {
+impl Reader {
     pub(super) fn principled(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
         let node = parameters.node;
         let mut number =

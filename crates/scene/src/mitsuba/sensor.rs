@@ -43,17 +43,18 @@ struct Film {
     aspect: f64,
 }
 
-impl Reader<'_> {
-    /// Reads the sensor named or numbered `name`, else the first, and names the others.
+impl Reader {
+    /// Reads the sensor named or numbered `name`, else the first, and names the others; `root` is the place
+    /// of errors.
     ///
     /// # Errors
     /// [`crate::Error`] if there is none or none of that name.
     pub(super) fn sensor(
         &mut self,
+        root: Node<'_>,
         sensors: &[Node<'_>],
         name: Option<&str>,
     ) -> Result<(CameraEntry, FilmSettings)> {
-        let root = self.document.root();
         let chosen = match name {
             None => 0,
             Some(name) => {

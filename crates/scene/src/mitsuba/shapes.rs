@@ -87,7 +87,7 @@ fn check_extent(node: Node<'_>, positions: impl IntoIterator<Item = Vec3>) -> Re
     Ok(())
 }
 
-impl Reader<'_> {
+impl Reader {
     /// Reads a shape, and places it unless it is a group.
     pub(super) fn shape(&mut self, node: Node<'_>) -> Result<()> {
         if node.kind() == "shapegroup" {

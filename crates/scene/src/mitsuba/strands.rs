@@ -13,7 +13,7 @@ use crate::{
 /// Start of the binary files of `hair`.
 const BINARY_HAIR: &[u8] = b"BINARY_HAIR";
 
-impl Reader<'_> {
+impl Reader {
     /// Reads the strands of a shape into the world; radii are lengths there.
     pub(super) fn strands(&mut self, parameters: &Parameters<'_>, to_world: DMat4) -> Result<Mesh> {
         let node = parameters.node;

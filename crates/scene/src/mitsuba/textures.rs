@@ -62,7 +62,7 @@ impl Value {
     }
 }
 
-impl Reader<'_> {
+impl Reader {
     /// Colour or texture of a parameter, if it is there.
     pub(super) fn value(
         &mut self,

@@ -204,8 +204,7 @@ impl Builder {
         }
         let mut mesh = self.mesh;
         if volume(&mesh) < 0.0 {
-            mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-            mesh.normals.iter_mut().flatten().for_each(|component| *component = -*component);
+            mesh.reverse();
             // Images were mirrored seen from the new outside; now v grows against the profile.
             mesh.uvs[0].iter_mut().for_each(|uv| uv[1] = -uv[1]);
         }

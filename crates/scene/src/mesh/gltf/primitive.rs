@@ -13,6 +13,7 @@ use super::{
 use crate::{
     error::Result,
     features,
+    geometry::extend,
     mesh::{Mesh, RepeatedMesh},
 };
 
@@ -262,11 +263,5 @@ fn append<const N: usize>(
     end: usize,
     absent: [f32; N],
 ) {
-    if let Some(own) = own {
-        all.resize(first_vertex, absent);
-        all.extend(own);
-    }
-    if !all.is_empty() {
-        all.resize(end, absent);
-    }
+    extend(all, &own.unwrap_or_default(), first_vertex, end, absent, |own| *own);
 }
