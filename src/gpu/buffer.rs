@@ -19,7 +19,7 @@ use crate::{
 
 /// A named storage buffer in device memory.
 pub struct Buffer {
-    raw: vk::Buffer,
+    pub(super) raw: vk::Buffer,
     size: u64,
     name: String,
     allocation: Option<Allocation>,
@@ -74,10 +74,10 @@ impl Buffer {
             .usage(usage)
             .sharing_mode(vk::SharingMode::EXCLUSIVE);
         // SAFETY: the device is alive and `info` valid.
-        let raw = unsafe { device.raw().create_buffer(&info, None) }
+        let raw = unsafe { device.raw.create_buffer(&info, None) }
             .map_err(|result| failed_buffer(&asker(), size, "vkCreateBuffer", result))?;
         // SAFETY: `raw` was just created from this device.
-        let requirements = unsafe { device.raw().get_buffer_memory_requirements(raw) };
+        let requirements = unsafe { device.raw.get_buffer_memory_requirements(raw) };
         // From here on `Drop` cleans up.
         let mut buffer =
             Self { raw, size, name: name.to_owned(), allocation: None, device: Arc::clone(device) };
@@ -100,7 +100,7 @@ impl Buffer {
                 },
             })?;
         // SAFETY: the allocation was made for this buffer's requirements and is bound once.
-        unsafe { device.raw().bind_buffer_memory(raw, allocation.memory(), allocation.offset()) }
+        unsafe { device.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) }
             .map_err(|result| failed_buffer(&asker(), size, "vkBindBufferMemory", result))?;
         buffer.allocation = Some(allocation);
         labels::name_object(device, raw, name);
@@ -115,10 +115,6 @@ impl Buffer {
     /// Name shown by debug tools and memory reports.
     pub(crate) fn name(&self) -> &str {
         &self.name
-    }
-
-    pub(super) fn raw(&self) -> vk::Buffer {
-        self.raw
     }
 
     /// Returns the words of a buffer whose memory the host shares with the device, as software devices do.
@@ -152,7 +148,7 @@ impl Buffer {
 impl Drop for Buffer {
     fn drop(&mut self) {
         // SAFETY: every submission has been waited for, so the device no longer uses the buffer.
-        unsafe { self.device.raw().destroy_buffer(self.raw, None) };
+        unsafe { self.device.raw.destroy_buffer(self.raw, None) };
         if let (Some(allocator), Some(allocation)) =
             (self.device.allocator().as_mut(), self.allocation.take())
             && let Err(error) = allocator.free(allocation)

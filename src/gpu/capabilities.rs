@@ -139,7 +139,7 @@ pub fn list(instance: &Instance) -> Result<Vec<Capabilities>> {
 
 pub(super) fn enumerate(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Capabilities)>> {
     // SAFETY: the instance is alive.
-    let devices = unsafe { instance.raw().enumerate_physical_devices() }
+    let devices = unsafe { instance.raw.enumerate_physical_devices() }
         .called("vkEnumeratePhysicalDevices")?;
     if devices.is_empty() {
         return Err(no_driver());
@@ -152,7 +152,7 @@ pub(super) fn enumerate(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, 
 }
 
 fn capabilities(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Capabilities {
-    let raw = instance.raw();
+    let raw = &instance.raw;
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
     let mut properties =

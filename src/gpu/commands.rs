@@ -27,7 +27,7 @@ const SUBMISSION_WAIT: Duration = Duration::from_secs(1);
 /// A command buffer that is recorded, submitted once and dropped.
 pub struct Commands {
     pool: vk::CommandPool,
-    raw: vk::CommandBuffer,
+    pub(super) raw: vk::CommandBuffer,
     fence: vk::Fence,
     timestamps: Option<Timestamps>,
     last_pass: String,
@@ -40,7 +40,7 @@ impl Commands {
     /// # Errors
     /// [`Error::Vulkan`] if a call fails.
     pub fn begin(device: &Arc<Device>) -> Result<Self> {
-        let raw_device = device.raw();
+        let raw_device = &device.raw;
         let pool_info = vk::CommandPoolCreateInfo::default()
             .queue_family_index(device.queue_family())
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
@@ -108,7 +108,7 @@ impl Commands {
             pipeline.name()
         );
         assert!(push_constants.len() <= 128, "{}: too many push constants", pipeline.name());
-        let raw = self.device.raw();
+        let raw = &self.device.raw;
         labels::begin(&self.device, self.raw, pipeline.name());
         self.barrier(
             vk::PipelineStageFlags::COMPUTE_SHADER,
@@ -127,7 +127,7 @@ impl Commands {
                     vk::PipelineBindPoint::COMPUTE,
                     pipeline.layout(),
                     set.index(),
-                    &[set.raw()],
+                    &[set.raw],
                     &[],
                 );
             }
@@ -159,7 +159,7 @@ impl Commands {
         self.barrier(vk::PipelineStageFlags::TRANSFER, vk::AccessFlags::TRANSFER_WRITE);
         // SAFETY: recording; the buffer has transfer usage and the caller keeps it alive.
         unsafe {
-            self.device.raw().cmd_fill_buffer(self.raw, buffer.raw(), 0, bytes, word);
+            self.device.raw.cmd_fill_buffer(self.raw, buffer.raw, 0, bytes, word);
         }
     }
 
@@ -179,17 +179,12 @@ impl Commands {
         let region =
             vk::BufferCopy::default().src_offset(from_offset).dst_offset(to_offset).size(size);
         // SAFETY: recording; both buffers have transfer usage and the caller keeps them alive.
-        unsafe { self.device.raw().cmd_copy_buffer(self.raw, from.raw(), to.raw(), &[region]) };
+        unsafe { self.device.raw.cmd_copy_buffer(self.raw, from.raw, to.raw, &[region]) };
     }
 
     /// Makes everything written so far readable by the host once the submission has finished.
     pub(crate) fn make_visible_to_host(&mut self) {
         self.barrier(vk::PipelineStageFlags::HOST, vk::AccessFlags::HOST_READ);
-    }
-
-    /// The command buffer, for commands that no pass needs.
-    pub(super) fn raw(&self) -> vk::CommandBuffer {
-        self.raw
     }
 
     /// Lets everything written so far be seen by `access` in the stages `next`.
@@ -199,7 +194,7 @@ impl Commands {
             .src_access_mask(vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE)
             .dst_access_mask(access);
         let flags = vk::DependencyFlags::empty();
-        let raw = self.device.raw();
+        let raw = &self.device.raw;
         // SAFETY: the command buffer is recording.
         unsafe { raw.cmd_pipeline_barrier(self.raw, writers, next, flags, &[barrier], &[], &[]) };
     }
@@ -210,7 +205,7 @@ impl Commands {
     /// [`Error::Vulkan`] if a call fails, [`Error::Device`] if the device is lost; both name the last
     /// pass of the submission.
     pub fn submit_and_wait(self) -> Result<PassTimes> {
-        let raw = self.device.raw();
+        let raw = &self.device.raw;
         let failed = |call: &str, result| {
             vulkan_error(&format!("{call} (last pass {})", self.last_pass), result)
         };
@@ -253,8 +248,8 @@ impl Drop for Commands {
     fn drop(&mut self) {
         // SAFETY: either never submitted or waited for; destroying null handles is allowed.
         unsafe {
-            self.device.raw().destroy_fence(self.fence, None);
-            self.device.raw().destroy_command_pool(self.pool, None);
+            self.device.raw.destroy_fence(self.fence, None);
+            self.device.raw.destroy_command_pool(self.pool, None);
         }
     }
 }

@@ -28,7 +28,7 @@ fn vulkan_format(format: TexelFormat) -> vk::Format {
 /// One descriptor set with its own pool.
 pub struct DescriptorSet {
     pool: vk::DescriptorPool,
-    raw: vk::DescriptorSet,
+    pub(super) raw: vk::DescriptorSet,
     views: Vec<vk::BufferView>,
     buffer_bytes: BTreeMap<String, u64>,
     table: &'static BindingTable,
@@ -52,7 +52,7 @@ impl DescriptorSet {
             .map(|ty| vk::DescriptorPoolSize::default().ty(ty).descriptor_count(count));
         let pool_info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         // SAFETY: the device is alive.
-        let pool = unsafe { device.raw().create_descriptor_pool(&pool_info, None) }
+        let pool = unsafe { device.raw.create_descriptor_pool(&pool_info, None) }
             .called("vkCreateDescriptorPool")?;
         // From here on `Drop` cleans up.
         let mut set = Self {
@@ -66,16 +66,16 @@ impl DescriptorSet {
             table,
             device: Arc::clone(device),
         };
-        let layouts = [device.set_layouts().of(table)];
+        let layouts = [device.set_layouts.of(table)];
         let allocate =
             vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
         // SAFETY: the pool has room for this one set.
-        set.raw = unsafe { device.raw().allocate_descriptor_sets(&allocate) }
+        set.raw = unsafe { device.raw.allocate_descriptor_sets(&allocate) }
             .called("vkAllocateDescriptorSets")?[0];
         labels::name_object(device, set.raw, table.name);
         for (binding, buffer) in buffers {
             let info =
-                [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)];
+                [vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(vk::WHOLE_SIZE)];
             let mut view = [vk::BufferView::null()];
             let write = vk::WriteDescriptorSet::default()
                 .dst_set(set.raw)
@@ -89,7 +89,7 @@ impl DescriptorSet {
                 }
             };
             // SAFETY: set and buffer are alive and nothing uses the set yet.
-            unsafe { device.raw().update_descriptor_sets(&[write], &[]) };
+            unsafe { device.raw.update_descriptor_sets(&[write], &[]) };
         }
         Ok(set)
     }
@@ -111,11 +111,11 @@ impl DescriptorSet {
             });
         }
         let info = vk::BufferViewCreateInfo::default()
-            .buffer(buffer.raw())
+            .buffer(buffer.raw)
             .format(vulkan_format(format))
             .range(texels * texel_bytes);
         // SAFETY: the buffer is alive, has texel-buffer usage and holds that many texels.
-        let view = unsafe { self.device.raw().create_buffer_view(&info, None) }
+        let view = unsafe { self.device.raw.create_buffer_view(&info, None) }
             .called(&format!("vkCreateBufferView({})", buffer.name()))?;
         self.views.push(view);
         labels::name_object(&self.device, view, buffer.name());
@@ -125,10 +125,6 @@ impl DescriptorSet {
     /// Bytes of the buffers in the set by their names.
     pub fn buffer_bytes(&self) -> &BTreeMap<String, u64> {
         &self.buffer_bytes
-    }
-
-    pub(super) fn raw(&self) -> vk::DescriptorSet {
-        self.raw
     }
 
     /// Returns true if the set has a buffer with this number.
@@ -147,9 +143,9 @@ impl Drop for DescriptorSet {
         // SAFETY: every submission is waited for; destroying the pool frees the set, and the views
         // belong to the set alone.
         unsafe {
-            self.device.raw().destroy_descriptor_pool(self.pool, None);
+            self.device.raw.destroy_descriptor_pool(self.pool, None);
             for view in &self.views {
-                self.device.raw().destroy_buffer_view(*view, None);
+                self.device.raw.destroy_buffer_view(*view, None);
             }
         }
     }

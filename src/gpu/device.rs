@@ -38,20 +38,20 @@ pub enum Tracer {
 
 /// A logical device with its queue, allocator, set layouts, pipelines and the driver's pipeline cache.
 pub struct Device {
-    raw: ash::Device,
-    debug_names: Option<ext::debug_utils::Device>,
+    pub(super) raw: ash::Device,
+    pub(super) debug_names: Option<ext::debug_utils::Device>,
     queue: Mutex<vk::Queue>,
     capabilities: Capabilities,
-    physical: vk::PhysicalDevice,
+    pub(super) physical: vk::PhysicalDevice,
     tracer: Tracer,
     embree: Option<Arc<Embree>>,
-    set_layouts: SetLayouts,
+    pub(super) set_layouts: SetLayouts,
     pipeline_cache: PipelineCache,
-    pipelines: Pipelines,
+    pub(super) pipelines: Pipelines,
     // Emptied in `drop`, before the device is destroyed.
     allocator: Mutex<Option<Allocator>>,
     // Last: the instance must outlive the device.
-    instance: Arc<Instance>,
+    pub(super) instance: Arc<Instance>,
 }
 
 impl Device {
@@ -139,14 +139,14 @@ impl Device {
             .enabled_extension_names(&extensions)
             .push_next(&mut features12);
         // SAFETY: `physical` belongs to this instance and has the family and feature asked for.
-        let raw = unsafe { instance.raw().create_device(physical, &info, None) }
+        let raw = unsafe { instance.raw.create_device(physical, &info, None) }
             .called("vkCreateDevice")?;
         // SAFETY: the queue was requested at creation.
         let queue = unsafe { raw.get_device_queue(queue_family, 0) };
         let debug_names =
-            instance.has_debug_utils().then(|| ext::debug_utils::Device::new(instance.raw(), &raw));
+            instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
         let allocator = Allocator::new(&AllocatorCreateDesc {
-            instance: instance.raw().clone(),
+            instance: instance.raw.clone(),
             device: raw.clone(),
             physical_device: physical,
             debug_settings: AllocatorDebugSettings::default(),
@@ -236,22 +236,6 @@ impl Device {
         self.pipeline_cache.save(&self.raw, &self.capabilities);
     }
 
-    pub(super) fn raw(&self) -> &ash::Device {
-        &self.raw
-    }
-
-    pub(super) fn instance(&self) -> &Arc<Instance> {
-        &self.instance
-    }
-
-    pub(super) fn physical(&self) -> vk::PhysicalDevice {
-        self.physical
-    }
-
-    pub(super) fn debug_names(&self) -> Option<&ext::debug_utils::Device> {
-        self.debug_names.as_ref()
-    }
-
     /// Locks the queue for one thread. Pipelines are created under the same lock:
     /// software drivers compile a pipeline on the queue's own thread when a dispatch first uses it,
     /// and Mesa 22.3 was seen to crash there when tests ran in several threads.
@@ -263,16 +247,8 @@ impl Device {
         self.capabilities.queue_family.unwrap_or_default()
     }
 
-    pub(super) fn set_layouts(&self) -> &SetLayouts {
-        &self.set_layouts
-    }
-
-    pub(super) fn pipelines(&self) -> &Pipelines {
-        &self.pipelines
-    }
-
     pub(super) fn pipeline_cache(&self) -> vk::PipelineCache {
-        self.pipeline_cache.raw()
+        self.pipeline_cache.raw
     }
 
     pub(super) fn allocator(&self) -> MutexGuard<'_, Option<Allocator>> {
@@ -327,7 +303,7 @@ pub(crate) fn tracer_name(embree: Option<&Arc<Embree>>) -> String {
 /// Tests whether a device has an extension.
 fn has_extension(instance: &Instance, physical: vk::PhysicalDevice, name: &CStr) -> Result<bool> {
     // SAFETY: `physical` belongs to this instance.
-    let extensions = unsafe { instance.raw().enumerate_device_extension_properties(physical) }
+    let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
         .called("vkEnumerateDeviceExtensionProperties")?;
     Ok(extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name)))
 }

@@ -25,12 +25,12 @@ pub type Messages = Mutex<Vec<String>>;
 
 /// A Vulkan 1.2 instance, with surface extensions if it was made for a display.
 pub struct Instance {
-    raw: ash::Instance,
+    pub(super) raw: ash::Instance,
     debug: Option<DebugMessenger>,
     messages: Arc<Messages>,
-    has_debug_utils: bool,
+    pub(super) has_debug_utils: bool,
     // Last, since the loader must outlive everything loaded from it.
-    entry: ash::Entry,
+    pub(super) entry: ash::Entry,
 }
 
 struct DebugMessenger {
@@ -148,19 +148,6 @@ impl Instance {
             None
         };
         Ok(Self { raw, debug, messages, has_debug_utils, entry })
-    }
-
-    pub(super) fn raw(&self) -> &ash::Instance {
-        &self.raw
-    }
-
-    pub(super) fn entry(&self) -> &ash::Entry {
-        &self.entry
-    }
-
-    /// True if objects and passes can be named.
-    pub(super) fn has_debug_utils(&self) -> bool {
-        self.has_debug_utils
     }
 
     /// Messages of the validation layers so far; empty without validation.

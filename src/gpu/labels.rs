@@ -8,7 +8,9 @@ use super::device::Device;
 
 /// Gives `object` the name shown by validation messages and capture tools.
 pub(super) fn name_object<T: vk::Handle>(device: &Arc<Device>, object: T, name: &str) {
-    let (Some(functions), Ok(name)) = (device.debug_names(), CString::new(name)) else { return };
+    let (Some(functions), Ok(name)) = (device.debug_names.as_ref(), CString::new(name)) else {
+        return;
+    };
     let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
     // SAFETY: `object` is a live handle of this device. A failure only loses the name.
     let _ = unsafe { functions.set_debug_utils_object_name(&info) };
@@ -16,7 +18,9 @@ pub(super) fn name_object<T: vk::Handle>(device: &Arc<Device>, object: T, name: 
 
 /// Opens a labelled region of a command buffer.
 pub(super) fn begin(device: &Device, commands: vk::CommandBuffer, name: &str) {
-    let (Some(functions), Ok(name)) = (device.debug_names(), CString::new(name)) else { return };
+    let (Some(functions), Ok(name)) = (device.debug_names.as_ref(), CString::new(name)) else {
+        return;
+    };
     let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
     // SAFETY: `commands` is in the recording state.
     unsafe { functions.cmd_begin_debug_utils_label(commands, &label) };
@@ -24,7 +28,7 @@ pub(super) fn begin(device: &Device, commands: vk::CommandBuffer, name: &str) {
 
 /// Closes the region that [`begin`] opened.
 pub(super) fn end(device: &Device, commands: vk::CommandBuffer) {
-    let Some(functions) = device.debug_names() else { return };
+    let Some(functions) = device.debug_names.as_ref() else { return };
     // SAFETY: `commands` is in the recording state with an open label.
     unsafe { functions.cmd_end_debug_utils_label(commands) };
 }

@@ -30,7 +30,7 @@ impl Pipeline {
         constants: &[(u32, u32)],
     ) -> Result<Self> {
         let key = (name, spirv, constants);
-        let made = device.pipelines().get_or_make(key, || make(device, name, spirv, constants))?;
+        let made = device.pipelines.get_or_make(key, || make(device, name, spirv, constants))?;
         Ok(Self { made, name: name.to_owned(), _device: Arc::clone(device) })
     }
 
@@ -57,8 +57,8 @@ fn make(device: &Arc<Device>, name: &str, spirv: &[u8], constants: &[(u32, u32)]
     let used = used_bindings(&words);
     let first_used = [0, 1, 2, 3].map(|set| used.iter().find(|(other, _)| *other == set));
     let layouts = first_used.map(|used| match used {
-        Some((set, number)) => device.set_layouts().with_buffer(*set, *number),
-        None => device.set_layouts().empty(),
+        Some((set, number)) => device.set_layouts.with_buffer(*set, *number),
+        None => device.set_layouts.empty,
     });
     let push_constants =
         [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(128)];
@@ -66,11 +66,11 @@ fn make(device: &Arc<Device>, name: &str, spirv: &[u8], constants: &[(u32, u32)]
         .set_layouts(&layouts)
         .push_constant_ranges(&push_constants);
     // SAFETY: the set layouts live as long as the device.
-    let layout = unsafe { device.raw().create_pipeline_layout(&layout_info, None) }
+    let layout = unsafe { device.raw.create_pipeline_layout(&layout_info, None) }
         .called(&format!("vkCreatePipelineLayout({name})"))?;
     let raw = compile(device, name, &words, constants, layout).inspect_err(|_| {
         // SAFETY: nothing uses the layout of a pipeline that was not made.
-        unsafe { device.raw().destroy_pipeline_layout(layout, None) };
+        unsafe { device.raw.destroy_pipeline_layout(layout, None) };
     })?;
     labels::name_object(device, raw, name);
     Ok(Made { raw, layout, used: first_used.map(|used| used.map(|(_, number)| *number)) })
@@ -83,7 +83,7 @@ fn compile(
     constants: &[(u32, u32)],
     layout: vk::PipelineLayout,
 ) -> Result<vk::Pipeline> {
-    let raw_device = device.raw();
+    let raw_device = &device.raw;
     let module_info = vk::ShaderModuleCreateInfo::default().code(words);
     // SAFETY: `words` is SPIR-V that the build compiled.
     let module = unsafe { raw_device.create_shader_module(&module_info, None) }

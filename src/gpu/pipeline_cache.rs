@@ -13,7 +13,7 @@ const CHECKSUM_BYTES: usize = 32;
 
 /// The driver's pipeline cache, kept per device and driver in the user's cache folder.
 pub(super) struct PipelineCache {
-    raw: vk::PipelineCache,
+    pub(super) raw: vk::PipelineCache,
 }
 
 impl PipelineCache {
@@ -32,10 +32,6 @@ impl PipelineCache {
         // Failure leaves a null cache, without which everything still works.
         let raw = unsafe { device.create_pipeline_cache(&info, None) }.unwrap_or_default();
         Self { raw }
-    }
-
-    pub(super) fn raw(&self) -> vk::PipelineCache {
-        self.raw
     }
 
     /// Writes the cache. Failure only costs compile time in the next run.

@@ -22,7 +22,7 @@ pub(super) fn descriptor_type(binding: &Binding) -> vk::DescriptorType {
 /// The layout of every table, and an empty one for the sets that a shader does not use.
 pub(super) struct SetLayouts {
     tables: Vec<vk::DescriptorSetLayout>,
-    empty: vk::DescriptorSetLayout,
+    pub(super) empty: vk::DescriptorSetLayout,
 }
 
 impl SetLayouts {
@@ -42,10 +42,6 @@ impl SetLayouts {
     pub(super) fn of(&self, table: &BindingTable) -> vk::DescriptorSetLayout {
         let first = table.bindings.first();
         first.map_or(self.empty, |binding| self.with_buffer(binding.set, binding.number))
-    }
-
-    pub(super) fn empty(&self) -> vk::DescriptorSetLayout {
-        self.empty
     }
 
     /// # Safety

@@ -65,9 +65,9 @@ impl Swapchain {
         window: Arc<dyn Target>,
         size: [u32; 2],
     ) -> Result<Self> {
-        let instance = device.instance();
-        let surfaces = khr::surface::Instance::new(instance.entry(), instance.raw());
-        let functions = khr::swapchain::Device::new(instance.raw(), device.raw());
+        let instance = &device.instance;
+        let surfaces = khr::surface::Instance::new(&instance.entry, &instance.raw);
+        let functions = khr::swapchain::Device::new(&instance.raw, &device.raw);
         // From here on `Drop` cleans up.
         let mut swapchain = Self {
             surfaces,
@@ -83,7 +83,7 @@ impl Swapchain {
         };
         // SAFETY: the device is alive.
         swapchain.acquired =
-            unsafe { device.raw().create_fence(&vk::FenceCreateInfo::default(), None) }
+            unsafe { device.raw.create_fence(&vk::FenceCreateInfo::default(), None) }
                 .called("vkCreateFence")?;
         swapchain.renew(size)?;
         Ok(swapchain)
@@ -101,20 +101,20 @@ impl Swapchain {
         let display = self.window.display_handle().map_err(no_handle)?.as_raw();
         let handle = self.window.window_handle().map_err(no_handle)?.as_raw();
         self.drop_images();
-        let instance = self.device.instance();
+        let instance = &self.device.instance;
         // SAFETY: the images of the old surface, if there was one, are gone. The handles are valid as long as
         // the window, which outlives the surface; the instance has the extensions of this display, which was
         // given to `Device::open_for_display`.
         let surface = unsafe {
             self.surfaces.destroy_surface(self.surface, None);
             self.surface = vk::SurfaceKHR::null();
-            ash_window::create_surface(instance.entry(), instance.raw(), display, handle, None)
+            ash_window::create_surface(&instance.entry, &instance.raw, display, handle, None)
         };
         self.surface = surface.called("surface of the window")?;
         // SAFETY: device, family and surface belong together.
         let presents = unsafe {
             self.surfaces.get_physical_device_surface_support(
-                self.device.physical(),
+                self.device.physical,
                 self.device.queue_family(),
                 self.surface,
             )
@@ -131,7 +131,7 @@ impl Swapchain {
     /// # Errors
     /// As [`Swapchain::new`].
     pub(crate) fn resize(&mut self, [width, height]: [u32; 2]) -> Result<()> {
-        let physical = self.device.physical();
+        let physical = self.device.physical;
         // SAFETY: device and surface belong together.
         let (limits, formats) = unsafe {
             (
@@ -222,7 +222,7 @@ impl Swapchain {
             return Ok(Presented::Skipped);
         }
         assert!(pixels.size() >= 4 * u64::from(width) * u64::from(height), "a pixel for each");
-        let raw = self.device.raw();
+        let raw = &self.device.raw;
         // SAFETY: the fence is not in use: every wait below ends before it is handed out again.
         let acquired = unsafe {
             self.functions.acquire_next_image(
@@ -290,11 +290,11 @@ impl Swapchain {
                     .layer_count(1),
             )
             .image_extent(vk::Extent3D { width, height, depth: 1 });
-        let raw = self.device.raw();
+        let raw = &self.device.raw;
         // SAFETY: recording; buffer and image are large enough and kept alive by the caller.
         unsafe {
             raw.cmd_pipeline_barrier(
-                commands.raw(),
+                commands.raw,
                 vk::PipelineStageFlags::COMPUTE_SHADER,
                 vk::PipelineStageFlags::TRANSFER,
                 vk::DependencyFlags::empty(),
@@ -303,14 +303,14 @@ impl Swapchain {
                 &[before],
             );
             raw.cmd_copy_buffer_to_image(
-                commands.raw(),
-                pixels.raw(),
+                commands.raw,
+                pixels.raw,
                 image,
                 vk::ImageLayout::TRANSFER_DST_OPTIMAL,
                 &[region],
             );
             raw.cmd_pipeline_barrier(
-                commands.raw(),
+                commands.raw,
                 vk::PipelineStageFlags::TRANSFER,
                 vk::PipelineStageFlags::BOTTOM_OF_PIPE,
                 vk::DependencyFlags::empty(),
@@ -326,7 +326,7 @@ impl Swapchain {
         // SAFETY: no other thread uses the queue; once it is idle nothing uses the images.
         unsafe {
             // A failure is a lost device, after which destroying is all that is left.
-            let _ = self.device.raw().queue_wait_idle(*queue);
+            let _ = self.device.raw.queue_wait_idle(*queue);
             self.functions.destroy_swapchain(self.raw, None);
         }
         self.raw = vk::SwapchainKHR::null();
@@ -350,7 +350,7 @@ impl Drop for Swapchain {
         // SAFETY: the swapchain is gone and every acquisition has been waited for; destroying null handles
         // is allowed.
         unsafe {
-            self.device.raw().destroy_fence(self.acquired, None);
+            self.device.raw.destroy_fence(self.acquired, None);
             self.surfaces.destroy_surface(self.surface, None);
         }
     }

@@ -31,9 +31,9 @@ impl Timestamps {
             .query_count(2 * capacity);
         // SAFETY: the device is alive; the queue family has timestamps (checked at its choice).
         let pool =
-            unsafe { device.raw().create_query_pool(&info, None) }.called("vkCreateQueryPool")?;
+            unsafe { device.raw.create_query_pool(&info, None) }.called("vkCreateQueryPool")?;
         // SAFETY: recording, outside of any pass.
-        unsafe { device.raw().cmd_reset_query_pool(commands, pool, 0, 2 * capacity) };
+        unsafe { device.raw.cmd_reset_query_pool(commands, pool, 0, 2 * capacity) };
         Ok(Self { pool, commands, names: Vec::new(), capacity, device: Arc::clone(device) })
     }
 
@@ -53,7 +53,7 @@ impl Timestamps {
         let query = u32::try_from(query).unwrap_or(u32::MAX);
         // SAFETY: recording; the query lies within the pool and is written once after its reset.
         unsafe {
-            self.device.raw().cmd_write_timestamp(
+            self.device.raw.cmd_write_timestamp(
                 self.commands,
                 vk::PipelineStageFlags::COMPUTE_SHADER,
                 self.pool,
@@ -68,7 +68,7 @@ impl Timestamps {
         if !ticks.is_empty() {
             // SAFETY: all these queries have been written by a submission that has finished.
             unsafe {
-                self.device.raw().get_query_pool_results(
+                self.device.raw.get_query_pool_results(
                     self.pool,
                     0,
                     &mut ticks,
@@ -95,6 +95,6 @@ impl Timestamps {
 impl Drop for Timestamps {
     fn drop(&mut self) {
         // SAFETY: the submission that used the pool has been waited for, or never happened.
-        unsafe { self.device.raw().destroy_query_pool(self.pool, None) };
+        unsafe { self.device.raw.destroy_query_pool(self.pool, None) };
     }
 }

@@ -17,7 +17,7 @@ const LEAST_REACH: f32 = 0.02;
 #[derive(Clone, Debug)]
 pub(crate) struct Rig {
     home: Camera,
-    camera: Camera,
+    pub(crate) camera: Camera,
     /// Distance to the nearest things in the picture, metres; at first that to its centre.
     reach: f32,
     least_reach: f32,
@@ -43,15 +43,6 @@ impl Rig {
             let (_, reach, _) = distances.select_nth_unstable_by(near, f32::total_cmp);
             self.reach = reach.max(self.least_reach);
         }
-    }
-
-    pub(crate) fn camera(&self) -> &Camera {
-        &self.camera
-    }
-
-    /// The camera, to change its lens or to replace it.
-    pub(crate) fn camera_mut(&mut self) -> &mut Camera {
-        &mut self.camera
     }
 
     /// Focuses on a point, metres.
@@ -144,27 +135,27 @@ mod tests {
         let quarter = std::f32::consts::FRAC_PI_2;
         let mut moved = rig();
         moved.orbit(-quarter, 0.0);
-        assert_near(moved.camera().position, [4.0, 1.0, 0.0]);
-        assert_near(moved.camera().look_at, [0.0, 1.0, 0.0]);
+        assert_near(moved.camera.position, [4.0, 1.0, 0.0]);
+        assert_near(moved.camera.look_at, [0.0, 1.0, 0.0]);
         let mut moved = rig();
         moved.orbit(0.0, 0.5 * quarter);
-        assert_near(moved.camera().position, [0.0, 1.0 + 8.0_f32.sqrt(), 8.0_f32.sqrt()]);
+        assert_near(moved.camera.position, [0.0, 1.0 + 8.0_f32.sqrt(), 8.0_f32.sqrt()]);
         let mut moved = rig();
         moved.turn(quarter, 0.0);
-        assert_near(moved.camera().look_at, [4.0, 1.0, 4.0]);
+        assert_near(moved.camera.look_at, [4.0, 1.0, 4.0]);
         let mut moved = rig();
         moved.pan(0.5, 0.25);
-        assert_near(moved.camera().position, [4.0, 3.0, 4.0]);
+        assert_near(moved.camera.position, [4.0, 3.0, 4.0]);
         let mut moved = rig();
         moved.zoom(0.5);
-        assert_near(moved.camera().position, [0.0, 1.0, 2.0]);
+        assert_near(moved.camera.position, [0.0, 1.0, 2.0]);
         let mut moved = rig();
         moved.fly(Vec3::Z, 1.0);
-        assert_near(moved.camera().position, [0.0, 1.0, 4.0 - 4.0 * PACE]);
+        assert_near(moved.camera.position, [0.0, 1.0, 4.0 - 4.0 * PACE]);
         moved.focus(Vec3::new(3.0, 1.0, 1.0));
-        assert_near(Vec3::X * moved.camera().focus_distance, [3.0 - 4.0 * PACE, 0.0, 0.0]);
+        assert_near(Vec3::X * moved.camera.focus_distance, [3.0 - 4.0 * PACE, 0.0, 0.0]);
         moved.go_home();
-        assert_eq!(moved.camera(), rig().camera());
+        assert_eq!(moved.camera, rig().camera);
     }
 
     #[test]
@@ -177,14 +168,14 @@ mod tests {
             moved.adapt(wall());
             moved.fly(Vec3::Z, 0.02);
         }
-        let left = moved.camera().position.z;
+        let left = moved.camera.position.z;
         assert!((0.5..2.5).contains(&left), "{left} m before the wall after two seconds");
         // A scene a thousand times as large is crossed in the same time, and no point changes nothing.
         let mut far = rig();
         far.adapt([Vec3::new(0.0, 1.0, -3996.0)].into_iter());
         far.adapt(std::iter::empty());
         far.fly(Vec3::Z, 1.0);
-        assert_near(far.camera().position / 1000.0, [0.0, 0.001, 0.004 - 4.0 * PACE]);
+        assert_near(far.camera.position / 1000.0, [0.0, 0.001, 0.004 - 4.0 * PACE]);
     }
 
     #[test]
@@ -192,10 +183,10 @@ mod tests {
         let mut moved = rig();
         for _ in 0..10 {
             moved.orbit(0.3, 1.0);
-            let offset = moved.camera().position - moved.camera().look_at;
+            let offset = moved.camera.position - moved.camera.look_at;
             assert!((offset.length() - 4.0).abs() < 1e-3, "{offset}");
         }
-        let offset = moved.camera().position - moved.camera().look_at;
+        let offset = moved.camera.position - moved.camera.look_at;
         assert!(offset.angle_between(Vec3::Y) < 0.04, "{offset}");
     }
 }

@@ -11,7 +11,7 @@ use std::{
 /// Folder of a scene, in which names of files start.
 #[derive(Clone, Debug)]
 pub(crate) struct Folder {
-    path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Folder that names may reach beside.
     allowed: Option<PathBuf>,
 }
@@ -26,11 +26,6 @@ impl Folder {
     pub(crate) fn allowing(self, allowed: Option<&Path>) -> Self {
         let allowed = allowed.and_then(|allowed| absolute(allowed).ok());
         Self { allowed: allowed.map(|allowed| without_parents(&allowed)), ..self }
-    }
-
-    /// The folder itself.
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Path of a file by its name. Slashes and backslashes separate folders.

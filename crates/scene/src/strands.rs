@@ -62,7 +62,7 @@ pub(crate) struct Detail {
     sides: usize,
     pieces: usize,
     /// One of so many strands is kept, and is as much thicker.
-    step: usize,
+    pub(crate) step: usize,
     seen: usize,
 }
 
@@ -77,11 +77,6 @@ impl Detail {
         };
         let pieces = (each / (2 * sides)).clamp(1, PIECES);
         Self { sides, pieces, step: spans.div_ceil(MAX_TRIANGLES / 6).max(1), seen: 0 }
-    }
-
-    /// Strands of which one is kept.
-    pub(crate) fn step(&self) -> usize {
-        self.step
     }
 
     /// Adds the next strand, whose control points have their radius as fourth component; u runs along it.

@@ -104,7 +104,7 @@ impl Worker {
             }
             Action::Bookmark => {
                 let [.., file] = names(&self.folder, &self.scene.name);
-                let written = write_text(&file, &camera_toml(self.rig.camera()));
+                let written = write_text(&file, &camera_toml(&self.rig.camera));
                 self.notice_written(written, &[file]);
             }
             // These are done by panel or window, or hold as long as the key.
@@ -116,7 +116,7 @@ impl Worker {
 
     /// Acts on a control. Returns true if the camera has changed.
     fn set(&mut self, setting: Setting) -> Result<bool> {
-        let camera = self.rig.camera_mut();
+        let camera = &mut self.rig.camera;
         match setting {
             Setting::FieldOfView(degrees) => camera.vertical_fov_deg = degrees,
             Setting::Aperture(radius) => camera.aperture_radius = radius,
@@ -163,7 +163,7 @@ impl Worker {
         match points.get((y * film[0] + x) as usize) {
             Some(Some(point)) => {
                 self.rig.focus(*point);
-                let camera = self.rig.camera();
+                let camera = &self.rig.camera;
                 self.notice = format!("in focus: {:.3} m", camera.focus_distance);
                 if camera.aperture_radius > 0.0 {
                     self.look(self.whole(), false)?;
@@ -284,7 +284,7 @@ impl Worker {
         }
         let (size, pixels) = self.panel.borrow_mut().picture()?;
         let film = self.left.session.image(&[])?;
-        let camera = self.rig.camera();
+        let camera = &self.rig.camera;
         let files = names(&self.folder, &self.scene.name);
         let saved = Saved { size, pixels: &pixels, film: &film, camera };
         let written = saved.write(&files);

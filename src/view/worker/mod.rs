@@ -253,7 +253,7 @@ impl Worker {
         self.looks = self.looks.wrapping_add(1);
         let [seed, ..] = hash_4d([self.settings.seed, self.looks, MOVED_SEED, 0]);
         self.error = None;
-        let camera = *self.rig.camera();
+        let camera = self.rig.camera;
         let start = Instant::now();
         for side in self.sides() {
             side.session.look(&camera, size, seed, learns)?;
@@ -396,7 +396,7 @@ impl Worker {
             tone: self.panel.borrow().tone,
             denoise: self.denoising.choice,
             speed: self.rig.speed,
-            camera: *self.rig.camera(),
+            camera: self.rig.camera,
             samples: [samples, self.spp],
             seconds: self.left.session.seconds(),
             error: self.error,

@@ -44,7 +44,7 @@ impl Reader {
                 .collect();
             detail.add(&mut mesh, basis, &placed);
         }
-        self.ignored.add(features::MI_CURVE, || match detail.step() {
+        self.ignored.add(features::MI_CURVE, || match detail.step {
             1 => node.place(),
             step => format!("{}; one of {step} strands, thicker by as much", node.place()),
         });

@@ -51,7 +51,7 @@ pub(super) struct AreaLight {
 
 fn color(entity: &Entity, name: &str, textures: &Textures) -> Result<Vec3> {
     match entity.find_of(name, &spectra::KINDS)? {
-        Some(parameter) => spectra::light(parameter, textures.folder()),
+        Some(parameter) => spectra::light(parameter, textures.folder),
         None => Ok(Vec3::ONE),
     }
 }
@@ -213,7 +213,7 @@ impl Lights {
             let message = "expected either `L` or `filename`, found both";
             return Err(color.place.error(format!("{}: {message}", entity.label())));
         }
-        let path = textures.folder().file(file).map_err(|message| entity.error(message))?;
+        let path = textures.folder.file(file).map_err(|message| entity.error(message))?;
         let mut map =
             read_map(&path, &mut textures.log).map_err(|error| entity.error(error.to_string()))?;
         if map.width != map.height || map.width > MAX_SIDE {

@@ -250,7 +250,7 @@ impl<'a> Materials<'a> {
             }
             None => {
                 let index = |name: &str| match entity.find_of(&own(name), &spectra::KINDS)? {
-                    Some(parameter) => spectra::index(parameter, self.textures.folder()),
+                    Some(parameter) => spectra::index(parameter, self.textures.folder),
                     None => {
                         Ok(media::index(&format!("metal-Cu-{name}")).unwrap_or_default().as_vec3())
                     }
@@ -270,7 +270,7 @@ impl<'a> Materials<'a> {
         let Some(parameter) = entity.find_of(name, &kinds)? else { return Ok(1.5) };
         let ior = match (parameter.kind, parameter.numbers()) {
             (Kind::Float, [ior, ..]) => *ior as f32,
-            _ => spectra::index(parameter, self.textures.folder())?.element_sum() / 3.0,
+            _ => spectra::index(parameter, self.textures.folder)?.element_sum() / 3.0,
         };
         if !(low..=high).contains(&ior) {
             let message = format!("expected a refractive index from {low} to {high}, found {ior}");

@@ -34,7 +34,7 @@ impl Materials<'_> {
     /// Absorption coefficient, per metre, of a medium that neither scatters nor emits light.
     fn absorption(&self, medium: &Entity) -> Result<Option<Vec3>> {
         let color = |name: &str| match medium.find_of(name, &spectra::KINDS)? {
-            Some(parameter) => spectra::index(parameter, self.textures.folder()),
+            Some(parameter) => spectra::index(parameter, self.textures.folder),
             None => Ok(Vec3::ONE),
         };
         let is_clear = medium.string("type")? == Some("homogeneous")

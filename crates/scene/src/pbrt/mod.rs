@@ -76,7 +76,7 @@ pub(crate) fn is_pbrt(path: &Path) -> bool {
 pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
     let mut ignored = Ignored::default();
     let (mut description, source) = Reader::read(path, Source::open(path, folder)?, &mut ignored)?;
-    let folder = source.folder().clone();
+    let folder = source.folder.clone();
     let mut log = Log { main: path, ignored, inputs: source.inputs, warnings: Vec::new() };
     let asked = asked(&description, &mut log);
     let view = camera::view(&description, path, &mut log)?;

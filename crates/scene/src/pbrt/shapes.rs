@@ -227,7 +227,7 @@ fn curve(entity: &Entity, strands: &mut Detail, log: &mut Log) -> Result<Mesh> {
             Vec3::from_array(*position).as_dvec3().extend(0.5 * (from + (to - from) * along))
         })
         .collect();
-    let name = match strands.step() {
+    let name = match strands.step {
         1 => features::PBRT_CURVE.name.to_owned(),
         step => format!("exact form of `curve`, and all but one of {step}, thicker by as much"),
     };

@@ -31,7 +31,7 @@ struct Open {
 /// Tokens of the main file and of the files that it includes.
 pub(super) struct Source {
     /// Folder of the main file, to which all paths are relative.
-    folder: Folder,
+    pub(super) folder: Folder,
     stack: Vec<Open>,
     /// Last token, if it is to be read again.
     held: Option<Token>,
@@ -62,11 +62,6 @@ impl Source {
         Ok(Self { folder, stack: vec![first], held: None, bytes_left: MAX_BYTES, inputs })
     }
 
-    /// Folder to which paths are relative.
-    pub(super) fn folder(&self) -> &Folder {
-        &self.folder
-    }
-
     /// Next token, or the end of an imported file or of everything.
     ///
     /// # Errors
@@ -84,7 +79,7 @@ impl Source {
                 return Ok(Part::End);
             }
             let Some(closed) = self.stack.pop() else { return Ok(Part::End) };
-            self.bytes_left = closed.tokens.bytes_left();
+            self.bytes_left = closed.tokens.bytes_left;
             if let Some(open) = self.stack.last_mut() {
                 open.tokens.limit(self.bytes_left);
             }
@@ -112,14 +107,14 @@ impl Source {
 
     /// Characters of the last token.
     pub(super) fn text(&self) -> &str {
-        self.stack.last().map_or("", |open| open.tokens.text())
+        self.stack.last().map_or("", |open| &open.tokens.text)
     }
 
     /// Place of the last token.
     pub(super) fn place(&self) -> Place {
         match self.stack.last() {
-            Some(open) => open.tokens.place().clone(),
-            None => Place { path: Rc::from(self.folder.path()), line: 0, column: 0 },
+            Some(open) => open.tokens.place.clone(),
+            None => Place { path: Rc::from(&*self.folder.path), line: 0, column: 0 },
         }
     }
 
@@ -140,7 +135,7 @@ impl Source {
         if self.inputs.len() > MAX_INCLUDES {
             return Err(place.error(format!("more than {MAX_INCLUDES} files are included")));
         }
-        let left = self.stack.last().map_or(self.bytes_left, |open| open.tokens.bytes_left());
+        let left = self.stack.last().map_or(self.bytes_left, |open| open.tokens.bytes_left);
         let tokens = open(&path, left).map_err(|error| place.error(error.to_string()))?;
         self.inputs.push(path.clone());
         self.stack.push(Open { path, tokens, restores });

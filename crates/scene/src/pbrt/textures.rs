@@ -59,7 +59,7 @@ struct Decoding {
 /// Textures of a scene, with the images read so far.
 pub(super) struct Textures<'a> {
     description: &'a Description,
-    folder: &'a Folder,
+    pub(super) folder: &'a Folder,
     /// Report of all that reads materials and lights.
     pub log: Log<'a>,
     images: HashMap<(PathBuf, String), Arc<Texture>>,
@@ -71,11 +71,6 @@ impl<'a> Textures<'a> {
     /// Takes the textures of `description`; paths are relative to `folder`.
     pub(super) fn new(description: &'a Description, folder: &'a Folder, log: Log<'a>) -> Self {
         Self { description, folder, log, images: HashMap::new(), values: HashMap::new() }
-    }
-
-    /// Folder to which paths are relative.
-    pub(super) fn folder(&self) -> &'a Folder {
-        self.folder
     }
 
     /// Spectrum of a parameter, constant or textured, if it is given.

@@ -50,10 +50,10 @@ pub(super) struct Tokens<R> {
     reader: R,
     line: usize,
     column: usize,
-    bytes_left: u64,
+    pub(super) bytes_left: u64,
     buffer: Vec<u8>,
-    text: String,
-    place: Place,
+    pub(super) text: String,
+    pub(super) place: Place,
 }
 
 impl<R: BufRead> Tokens<R> {
@@ -64,24 +64,9 @@ impl<R: BufRead> Tokens<R> {
         Self { reader, line: 1, column: 1, bytes_left: most_bytes, buffer, text, place }
     }
 
-    /// Bytes that may still be read.
-    pub(super) fn bytes_left(&self) -> u64 {
-        self.bytes_left
-    }
-
     /// Lets no more than so many bytes be read.
     pub(super) fn limit(&mut self, most_bytes: u64) {
         self.bytes_left = self.bytes_left.min(most_bytes);
-    }
-
-    /// Characters of the last token.
-    pub(super) fn text(&self) -> &str {
-        &self.text
-    }
-
-    /// Place of the last token, or of the end of the file.
-    pub(super) fn place(&self) -> &Place {
-        &self.place
     }
 
     /// Reads the next token; none at the end of the file.
@@ -244,8 +229,8 @@ mod tests {
         let mut tokens = tokens(text.as_bytes());
         let mut found = Vec::new();
         while let Some(token) = tokens.next().unwrap() {
-            let place = tokens.place();
-            found.push((token, tokens.text().to_owned(), place.line, place.column));
+            let place = tokens.place.clone();
+            found.push((token, tokens.text.to_owned(), place.line, place.column));
         }
         found
     }

@@ -84,7 +84,7 @@ impl LibraryMaterial {
 impl<'a> Library<'a> {
     /// Begins the library at `path`, which belongs to an OBJ file in `folder`.
     pub(super) fn new(folder: &'a Folder, path: &'a Path) -> Self {
-        let within = path.parent().and_then(|own| own.strip_prefix(folder.path()).ok());
+        let within = path.parent().and_then(|own| own.strip_prefix(&folder.path).ok());
         let within = within.unwrap_or(Path::new("")).to_owned();
         Self { folder, within, path, materials: Vec::new() }
     }
