@@ -74,7 +74,6 @@ pub(crate) fn faults(device: &Arc<Device>) -> Result<Vec<String>> {
     Ok(judge(&Answers::of_host(&accel), &Answers::of_device(device, &accel)?))
 }
 
-/// Answers to the rays of the test.
 #[derive(Clone, Debug, PartialEq)]
 struct Answers {
     hits: Vec<Option<Intersection>>,

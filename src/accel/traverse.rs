@@ -21,7 +21,6 @@ pub struct Intersection {
     pub distance: f32,
 }
 
-/// Work done for one ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Work {
     /// Calls of the step function.
@@ -151,7 +150,6 @@ fn inverse(x: f32) -> f32 {
     }
 }
 
-/// State of one ray.
 struct Traversal<'a> {
     accel: &'a Accel,
     any_hit: bool,

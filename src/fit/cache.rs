@@ -20,7 +20,6 @@ use crate::{
 
 /// Extension of fit files.
 pub(crate) const EXTENSION: &str = "fit";
-/// Name of the format in the header.
 const FORMAT: &str = "fenestra-fit";
 
 #[derive(Serialize, Deserialize)]
@@ -114,7 +113,6 @@ impl Cache {
         Self { folder }
     }
 
-    /// File of a fit.
     pub(crate) fn path(&self, key: &str) -> PathBuf {
         self.folder.join(format!("{key}.{EXTENSION}"))
     }

@@ -34,7 +34,6 @@ struct Block {
     log_scale: Lanes,
 }
 
-/// Packs the lobes into blocks.
 fn pack(components: &[Component]) -> Vec<Block> {
     let log_scale = |c: &Component| {
         if c.share > 0.0 { (c.share / kernel_integral(c.bandwidth)).ln() as f32 } else { NOTHING }

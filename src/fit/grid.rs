@@ -38,7 +38,6 @@ pub struct Grid {
     pub radiance: Vec<Vec3>,
 }
 
-/// A rectangle of cells.
 #[derive(Clone, Copy, Debug)]
 struct Rectangle {
     x0: usize,

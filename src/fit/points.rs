@@ -83,7 +83,6 @@ impl PointSet {
         points
     }
 
-    /// Number of points.
     pub(crate) fn len(&self) -> usize {
         self.weight.len()
     }

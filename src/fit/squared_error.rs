@@ -29,7 +29,6 @@ pub(crate) struct SquaredError {
     scales: Vec<f64>,
 }
 
-/// A lobe with its amplitude.
 #[derive(Clone, Copy)]
 struct Scaled {
     shape: Component,
@@ -63,7 +62,6 @@ impl SquaredError {
         (Self { patches, square, scales }, unknowns)
     }
 
-    /// Box constraints of the unknowns.
     pub(crate) fn bounds(&self) -> Bounds {
         let free = (f64::NEG_INFINITY, f64::INFINITY);
         let one =
@@ -95,7 +93,6 @@ impl SquaredError {
         (lobes.iter().map(component).collect(), energy)
     }
 
-    /// Evaluates value and gradient.
     pub(crate) fn evaluate(&self, unknowns: &[f64]) -> (f64, Vec<f64>) {
         let lobes = self.lobes(unknowns);
         let row = |index: usize| {

@@ -132,7 +132,6 @@ impl DescriptorSet {
         self.table.bindings.iter().any(|binding| binding.number == number)
     }
 
-    /// Number of the set.
     pub(crate) fn index(&self) -> u32 {
         self.table.set
     }

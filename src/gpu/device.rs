@@ -300,7 +300,6 @@ pub(crate) fn tracer_name(embree: Option<&Arc<Embree>>) -> String {
     embree.map_or_else(|| "device".to_owned(), |embree| format!("Embree {}", embree.version()))
 }
 
-/// Tests whether a device has an extension.
 fn has_extension(instance: &Instance, physical: vk::PhysicalDevice, name: &CStr) -> Result<bool> {
     // SAFETY: `physical` belongs to this instance.
     let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }

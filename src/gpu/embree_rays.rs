@@ -89,7 +89,6 @@ impl Packet {
         self.count += 1;
     }
 
-    /// Forgets all rays.
     pub(crate) fn clear(&mut self) {
         self.followed = [0; LANES];
         self.count = 0;

@@ -28,7 +28,6 @@ impl<T: HasWindowHandle + HasDisplayHandle + Send + Sync> Target for T {}
 /// Outcome of [`Swapchain::present`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Presented {
-    /// The picture is in the window.
     Shown,
     /// The display had no room for it; the next one may be shown.
     Skipped,
@@ -38,7 +37,6 @@ pub(crate) enum Presented {
     Lost,
 }
 
-/// Images of a window.
 pub(crate) struct Swapchain {
     surfaces: khr::surface::Instance,
     functions: khr::swapchain::Device,

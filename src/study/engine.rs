@@ -72,7 +72,6 @@ pub(crate) fn run(
     Ok((results, None))
 }
 
-/// A study under way.
 struct Study<'a> {
     plan: &'a Plan,
     folder: &'a Folder,
@@ -295,7 +294,6 @@ fn mask_settings() -> Settings {
     Settings { sampler, shadow_rays: 1, depth: 1, aovs: vec![Aov::Position], ..Settings::default() }
 }
 
-/// Pixels of a scene's film.
 fn pixels(scene: &Scene) -> f64 {
     f64::from(scene.film.width) * f64::from(scene.film.height)
 }

@@ -138,7 +138,6 @@ impl Folder {
         self.path.join("runs").join(scene).join(format!("{stem}.json"))
     }
 
-    /// Path of the file of an overhead round.
     pub(crate) fn round(&self, scene: &str, repetition: u32) -> PathBuf {
         self.run(scene, &format!("overhead-{repetition}"))
     }

@@ -38,7 +38,6 @@ impl Figure {
         }
     }
 
-    /// Value of a look.
     pub(crate) fn of(self, measurement: &Measurement) -> f64 {
         match self {
             Self::Relmse => measurement.relmse,

@@ -238,7 +238,6 @@ impl Reference {
         Ok(Self { first, second, sampler: sampler.filter(|_| whole), own })
     }
 
-    /// Averages the halves.
     pub(crate) fn mean(&self) -> RgbImage {
         mean(&self.first, &self.second)
     }

@@ -15,7 +15,6 @@ pub enum Rule {
 }
 
 impl Rule {
-    /// Rule of a wall time.
     pub(crate) fn time(time: Duration) -> Self {
         Self::Seconds(time.as_secs_f64())
     }

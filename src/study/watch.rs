@@ -23,7 +23,6 @@ pub(crate) struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// Starts the clock.
     pub(crate) fn new(observer: &'a mut dyn Observer) -> Self {
         Self {
             observer,

@@ -51,7 +51,6 @@ impl Rig {
         self.camera.focus_distance = (point - self.camera.position).dot(forward).max(1e-3);
     }
 
-    /// Returns to the start.
     pub(crate) fn go_home(&mut self) {
         self.camera = self.home;
     }

@@ -37,7 +37,6 @@ pub(super) struct Controls {
 }
 
 impl Controls {
-    /// Prepares to draw.
     pub(super) fn new() -> Self {
         let context = Context::default();
         let mut fonts = FontDefinitions::empty();
@@ -72,7 +71,6 @@ impl Controls {
         width >= LEAST_WINDOW[0] && height >= LEAST_WINDOW[1]
     }
 
-    /// Takes over what the renderer does.
     pub(super) fn report(&mut self, status: Status) {
         self.latest = Some(status);
     }
@@ -179,7 +177,6 @@ impl Controls {
     }
 }
 
-/// Lays out the panel.
 fn panel_of(ui: &mut Ui, status: &mut Status, inputs: &mut Vec<Input>) {
     let mut set = |setting| inputs.push(Input::Set(setting));
     let mut keys = Vec::new();
@@ -287,7 +284,6 @@ fn panel_of(ui: &mut Ui, status: &mut Status, inputs: &mut Vec<Input>) {
     inputs.extend(keys.into_iter().map(Input::Key));
 }
 
-/// Lays out the table of keys.
 fn help(context: &Context) {
     let window = egui::Window::new("Keys").anchor(Align2::CENTER_CENTER, [0.0, 0.0]);
     window.collapsible(false).resizable(false).vscroll(true).show(context, |ui| {

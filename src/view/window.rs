@@ -132,7 +132,6 @@ fn no_window(error: &dyn std::fmt::Display) -> Error {
     }
 }
 
-/// The window's thread.
 struct App {
     /// Start of the rendering thread.
     start: Option<(Scene, Options, Receiver<Input>)>,

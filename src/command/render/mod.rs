@@ -187,7 +187,6 @@ fn open(arguments: &Arguments) -> Result<Arc<Device>> {
     Ok(device)
 }
 
-/// Prepares to render on the device.
 fn prepare(
     arguments: &Arguments,
     device: &Arc<Device>,

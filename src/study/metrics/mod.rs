@@ -62,7 +62,6 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    /// Returns every metric with its name.
     pub(crate) fn named(&self) -> [(&'static str, f64); 10] {
         [
             ("mse", self.mse),

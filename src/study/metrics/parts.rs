@@ -54,7 +54,6 @@ impl PartErrors {
         Ok(Some(Self { mse, relmse: relative.mean, relmse_trimmed: relative.trimmed }))
     }
 
-    /// Applies a function to every figure.
     #[must_use]
     pub(crate) fn map(self, function: impl Fn(f64) -> f64) -> Self {
         Self {

@@ -58,7 +58,6 @@ pub fn count(value: f64) -> String {
     if value.fract() == 0.0 { format!("{value:.0}") } else { format!("{value:.1}") }
 }
 
-/// Formats a share as a percentage.
 pub(crate) fn percent(share: f64) -> String {
     format!("{}%", number(100.0 * share, 3))
 }

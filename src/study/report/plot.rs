@@ -28,7 +28,6 @@ pub(crate) struct Point {
     pub label: String,
 }
 
-/// Points of one colour.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Series {
     /// Index of colour and marker.
@@ -106,7 +105,6 @@ impl Axis {
     }
 }
 
-/// Coordinates of the drawing.
 struct Frame {
     x: Axis,
     y: Axis,

@@ -38,7 +38,6 @@ pub(super) fn find<'a>(
     })
 }
 
-/// A figure of the tables at a glance.
 struct Glance {
     caption: &'static str,
     value: fn(&Summary) -> Option<&Interval>,

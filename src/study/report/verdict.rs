@@ -9,7 +9,6 @@ use crate::study::{
     statistics::Interval, summary::Summary,
 };
 
-/// The verdicts of all scenes.
 pub(super) fn all(report: &Report, rules: &[Rule]) -> String {
     let items: String = report
         .scenes

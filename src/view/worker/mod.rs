@@ -130,7 +130,6 @@ pub(super) struct Parts {
 }
 
 impl Worker {
-    /// Prepares to render.
     pub(crate) fn new(parts: Parts) -> Self {
         let Parts { scene, device, settings, spp, left, panel, folder, announce } = parts;
         let is_software = device.capabilities().kind == "software";

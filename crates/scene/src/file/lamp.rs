@@ -23,7 +23,6 @@ pub(crate) enum LampKindEntry {
     Directional(DirectionalEntry),
 }
 
-/// Keys of a `point` lamp.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PointEntry {
@@ -33,7 +32,6 @@ pub(crate) struct PointEntry {
     pub intensity: [f32; 3],
 }
 
-/// Keys of a `spot` lamp.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SpotEntry {
@@ -58,7 +56,6 @@ fn default_outer_angle_deg() -> f32 {
     45.0
 }
 
-/// Keys of a `directional` lamp.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DirectionalEntry {

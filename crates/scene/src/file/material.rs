@@ -13,7 +13,6 @@ pub(crate) struct MaterialEntry {
     pub line: usize,
     /// Keys of all types.
     pub keys: MaterialKeys,
-    /// Model and its parameters.
     pub kind: MaterialKindEntry,
 }
 
@@ -60,7 +59,6 @@ pub(crate) enum MaterialKindEntry {
     Measured(MeasuredEntry),
 }
 
-/// Keys of a `diffuse` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DiffuseEntry {
@@ -68,7 +66,6 @@ pub(crate) struct DiffuseEntry {
     pub reflectance: Textured<[f32; 3]>,
 }
 
-/// Keys of a `plastic` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PlasticEntry {
@@ -103,7 +100,6 @@ pub(crate) struct ConductorEntry {
     pub k: Option<[f32; 3]>,
 }
 
-/// Keys of a `principled` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PrincipledEntry {
@@ -144,7 +140,6 @@ pub(crate) struct MirrorEntry {
     pub reflectance: Textured<[f32; 3]>,
 }
 
-/// Keys of a `dielectric` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DielectricEntry {
@@ -166,7 +161,6 @@ pub(crate) struct DielectricEntry {
     pub absorption: [f32; 3],
 }
 
-/// Keys of a `thin_dielectric` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ThinDielectricEntry {
@@ -181,7 +175,6 @@ pub(crate) struct ThinDielectricEntry {
     pub transmittance: [f32; 3],
 }
 
-/// Keys of a `measured` material.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MeasuredEntry {

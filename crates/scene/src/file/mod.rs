@@ -31,20 +31,14 @@ use crate::error::Result;
 #[derive(Debug)]
 pub(crate) struct SceneFile {
     pub camera: CameraEntry,
-    /// Every `[[camera.keyframe]]`, in file order.
     pub keyframes: Vec<KeyframeEntry>,
     pub film: FilmSettings,
     /// `[environment]`; black without.
     pub environment: Option<EnvironmentEntry>,
-    /// Every `[[lamp]]`, in file order.
     pub lamps: Vec<LampEntry>,
-    /// Every `[[portal]]`, in file order.
     pub portals: Vec<Entry<PortalKeys>>,
-    /// Every `[[material]]`, in file order.
     pub materials: Vec<MaterialEntry>,
-    /// Every `[[object]]`, in file order.
     pub objects: Vec<ObjectEntry>,
-    /// Every `[[include]]`, in file order.
     pub includes: Vec<Entry<IncludeKeys>>,
 }
 

@@ -43,7 +43,6 @@ struct RootKeys {
     environment: Option<EnvironmentEntry>,
 }
 
-/// Reads a whole scene file.
 pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
     let root = DeTable::parse(text)?;
     let span = root.span();

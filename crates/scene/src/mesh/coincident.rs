@@ -149,7 +149,6 @@ impl Mesh {
         }
     }
 
-    /// Adds a copy of a vertex.
     fn push_moved(&mut self, vertex: usize, shift: Vec3) -> u32 {
         fn repeat<T: Copy>(all: &mut Vec<T>, vertex: usize) {
             if let Some(&own) = all.get(vertex) {

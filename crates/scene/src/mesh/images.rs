@@ -37,7 +37,6 @@ impl Images {
         }
     }
 
-    /// Files that have been read.
     pub(super) fn files(&self) -> impl Iterator<Item = PathBuf> {
         self.cache.files().into_iter()
     }

@@ -235,7 +235,6 @@ impl Mesh {
         self.materials.iter().zip(used).filter_map(|(material, used)| used.then_some(material))
     }
 
-    /// Starts an object at the next triangle.
     fn start_object(&mut self, name: &str) {
         let (name, first_triangle) = (name.to_owned(), self.triangles.len());
         start_object(&mut self.objects, ObjectStart { name, first_triangle, first_instance: 0 });

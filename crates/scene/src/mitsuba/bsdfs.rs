@@ -42,7 +42,6 @@ fn current_name(kind: &str) -> &str {
     }
 }
 
-/// Width of the distribution of a rough model.
 pub(super) struct Width {
     pub alpha: f32,
     /// Factor of √α, for which `alpha` is then 1.
@@ -86,7 +85,6 @@ impl Model {
 }
 
 impl Reader {
-    /// Reads a reflection model and those in it.
     pub(super) fn model(&mut self, node: Node<'_>) -> Result<Model> {
         self.nested(node, MAX_DEPTH)
     }
@@ -162,7 +160,6 @@ impl Reader {
         Ok(model)
     }
 
-    /// The one model in another.
     pub(super) fn inner(
         &mut self,
         parameters: &Parameters<'_>,
@@ -217,7 +214,6 @@ impl Reader {
         Ok(model)
     }
 
-    /// Width of the distribution of a rough model.
     pub(super) fn width(&mut self, parameters: &Parameters<'_>) -> Result<Width> {
         let node = parameters.node;
         match parameters.string("distribution")? {

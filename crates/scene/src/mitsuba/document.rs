@@ -68,7 +68,6 @@ impl<'a> Node<'a> {
         &self.document.elements[self.index]
     }
 
-    /// Name of the element.
     pub(super) fn tag(self) -> &'a str {
         &self.element().tag
     }
@@ -93,7 +92,6 @@ impl<'a> Node<'a> {
         self.document.version
     }
 
-    /// Elements in this one, in their order.
     pub(super) fn children(self) -> impl Iterator<Item = Node<'a>> {
         let document = self.document;
         self.element().children.iter().map(move |&index| Node { document, index })
@@ -179,7 +177,6 @@ impl Document {
         Ok(builder.document)
     }
 
-    /// Element of the whole scene.
     pub(super) fn root(&self) -> Node<'_> {
         Node { document: self, index: 0 }
     }

@@ -23,12 +23,10 @@ pub(super) struct Parameters<'a> {
 }
 
 impl<'a> Parameters<'a> {
-    /// Takes the children of a plugin, none of them used yet.
     pub(super) fn new(node: Node<'a>) -> Self {
         Self { node, used: RefCell::default() }
     }
 
-    /// Marks a child as used.
     fn take(&self, node: Node<'a>) -> Node<'a> {
         self.used.borrow_mut().push(node.index);
         node
@@ -49,7 +47,6 @@ impl<'a> Parameters<'a> {
         Err(node.error(format!("`{name}`: expected an element {expected}, found {found}")))
     }
 
-    /// Number, if it is there.
     pub(super) fn float(&self, name: &str) -> Result<Option<f32>> {
         self.typed(name, &["float", "integer"])?.map(float).transpose()
     }
@@ -64,7 +61,6 @@ impl<'a> Parameters<'a> {
         Err(node.error(format!("`{name}`: expected {low} to {high}, found {value}")))
     }
 
-    /// Whole number, if it is there.
     pub(super) fn integer(&self, name: &str) -> Result<Option<i64>> {
         let Some(node) = self.typed(name, &["integer"])? else { return Ok(None) };
         let text = value(node)?.trim();
@@ -72,7 +68,6 @@ impl<'a> Parameters<'a> {
         text.parse().map(Some).map_err(|_| node.error(message()))
     }
 
-    /// Truth value, if it is there.
     pub(super) fn boolean(&self, name: &str) -> Result<Option<bool>> {
         let Some(node) = self.typed(name, &["boolean"])? else { return Ok(None) };
         match value(node)?.trim() {
@@ -82,12 +77,10 @@ impl<'a> Parameters<'a> {
         }
     }
 
-    /// Text, if it is there.
     pub(super) fn string(&self, name: &str) -> Result<Option<&'a str>> {
         self.typed(name, &["string"])?.map(value).transpose()
     }
 
-    /// Point or vector, if it is there.
     pub(super) fn vector(&self, name: &str) -> Result<Option<Vec3>> {
         let node = self.typed(name, &["point", "vector"])?;
         node.map(|node| transforms::vector(node, [0.0; 3]).map(|v| v.as_vec3())).transpose()

@@ -18,7 +18,6 @@ use crate::{
 /// Shape with the state in force at its directive.
 #[derive(Debug)]
 pub(super) struct Shape {
-    /// Type and parameters.
     pub entity: Entity,
     /// World, or object of instances, from shape.
     pub world_from_shape: DMat4,
@@ -36,7 +35,6 @@ pub(super) struct Shape {
 pub(super) struct Instance {
     /// World from the world of the object's definition.
     pub world_from_object: DMat4,
-    /// Place of `ObjectInstance`.
     pub place: Place,
 }
 
@@ -45,7 +43,6 @@ pub(super) struct Instance {
 pub(super) struct Object {
     pub name: String,
     pub shapes: Vec<Shape>,
-    /// Its uses.
     pub instances: Vec<Instance>,
     /// True once `ObjectBegin` has named it.
     pub is_defined: bool,

@@ -7,23 +7,18 @@ use crate::features::{self, Feature, Ignored};
 
 /// Parts of a scene that are left out, and files read.
 pub(super) struct Log<'a> {
-    /// Main file.
     pub main: &'a Path,
-    /// Parts that are left out.
     pub ignored: Ignored,
-    /// Files read.
     pub inputs: Vec<PathBuf>,
     /// Warnings of the readers of other files.
     pub warnings: Vec<String>,
 }
 
 impl Log<'_> {
-    /// Counts a part.
     pub(super) fn ignore(&mut self, feature: Feature, place: &Place) {
         self.ignore_named(feature, feature.name, place);
     }
 
-    /// Counts a part that has a name of its own.
     pub(super) fn ignore_named(&mut self, feature: Feature, name: &str, place: &Place) {
         let main = self.main;
         self.ignored.add_named(feature, name, || place.describe(main));

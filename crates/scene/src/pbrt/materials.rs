@@ -33,9 +33,7 @@ const COAT_IOR: (f32, f32) = (1.01, 4.0);
 const SOLID_IOR: (f32, f32) = (0.1, 10.0);
 
 pub(super) struct Materials<'a> {
-    /// Entities of the file.
     pub description: &'a Description,
-    /// Textures that the materials read.
     pub textures: Textures<'a>,
 }
 
@@ -47,7 +45,6 @@ struct Roughness {
 }
 
 impl<'a> Materials<'a> {
-    /// Takes the materials of `description`.
     pub(super) fn new(description: &'a Description, textures: Textures<'a>) -> Self {
         Self { description, textures }
     }

@@ -88,7 +88,6 @@ impl Values {
 /// Parameter of a directive.
 #[derive(Clone, Debug)]
 pub(super) struct Parameter {
-    /// Type.
     pub kind: Kind,
     pub name: String,
     /// Values, at least one.
@@ -263,7 +262,6 @@ impl Entity {
         Ok(Self { directive, name, place, parameters, own })
     }
 
-    /// Directive and type, for messages.
     pub(super) fn label(&self) -> String {
         format!("{} \"{}\"", self.directive, self.name)
     }
@@ -311,13 +309,11 @@ impl Entity {
         Ok(self.optional(name)?.unwrap_or(otherwise))
     }
 
-    /// Truth value, or `otherwise`.
     pub(super) fn boolean(&self, name: &str, otherwise: bool) -> Result<bool> {
         let found = self.find_of(name, &[Kind::Boolean])?;
         Ok(found.map_or(otherwise, |parameter| parameter.values == Values::Booleans(vec![true])))
     }
 
-    /// String, if it is given.
     pub(super) fn string(&self, name: &str) -> Result<Option<&str>> {
         Ok(self.find_of(name, &[Kind::Text])?.map(Parameter::text))
     }

@@ -37,7 +37,6 @@ pub(super) struct Source {
     held: Option<Token>,
     /// Bytes that may still be read; those of the open files are taken off.
     bytes_left: u64,
-    /// Files read.
     pub inputs: Vec<PathBuf>,
 }
 

@@ -118,7 +118,6 @@ impl Saved {
 /// States saved by directives that have not ended yet.
 #[derive(Debug, Default)]
 pub(super) struct States {
-    /// State in force.
     pub now: State,
     saved: Vec<(Saved, State, Place)>,
     /// Matrices that `CoordinateSystem` has named.

@@ -31,7 +31,6 @@ pub(super) enum Value {
 }
 
 impl Value {
-    /// The same number everywhere.
     pub(super) fn number(number: f64) -> Self {
         Self::Constant(Vec3::splat(number as f32))
     }
@@ -44,7 +43,6 @@ impl Value {
         }
     }
 
-    /// Multiplies by a constant.
     pub(super) fn scaled(self, factor: f32) -> Self {
         self.affine(Vec3::splat(factor), Vec3::ZERO)
     }

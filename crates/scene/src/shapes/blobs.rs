@@ -130,7 +130,6 @@ impl Field {
         self.joined(&distances(&self.added, point), &distances(&self.carved, point))
     }
 
-    /// Joins the distances of the parts.
     fn joined(&self, added: &[f64], carved: &[f64]) -> f64 {
         let added = soft_minimum(added, self.blend);
         if self.carved.is_empty() {

@@ -42,7 +42,6 @@ pub(crate) enum Radius {
     PerPoint(Vec<f32>),
 }
 
-/// Circle of the tube.
 #[derive(Clone, Copy, Debug)]
 struct Ring {
     center: DVec3,

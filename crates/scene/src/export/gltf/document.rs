@@ -78,7 +78,6 @@ impl Textures {
         }
     }
 
-    /// Writes all images into a folder.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
         let mut sheets = self.sheets.iter().enumerate();
         sheets.try_for_each(|(index, sheet)| sheet.write(&folder.join(sheet.name(index))))

@@ -33,7 +33,6 @@ pub(super) struct Sheet {
 }
 
 impl Sheet {
-    /// Tests for the same texels.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         let is_same = |pair: [&Option<TextureUse>; 2]| match pair {
             [Some(one), Some(other)] => {

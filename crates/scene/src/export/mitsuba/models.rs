@@ -45,7 +45,6 @@ pub(super) struct Translator<'a> {
 }
 
 impl Translator<'_> {
-    /// Translates the material.
     pub(super) fn model(mut self) -> Model {
         let surface = self.subject.surface;
         let is_glass = self.subject.material.kind.is_glass();

@@ -50,7 +50,6 @@ pub(super) struct Translator<'a> {
 }
 
 impl<'a> Translator<'a> {
-    /// Translates the material.
     pub(super) fn model(mut self) -> Model {
         let surface = self.subject.surface;
         // A normal map has no mapping of its own.
@@ -186,7 +185,6 @@ impl<'a> Translator<'a> {
         }
     }
 
-    /// Main colour of the model, with its texture.
     fn color(&mut self, name: &str, factor: Vec3) -> String {
         match &self.subject.surface.color {
             Some(used) => self.texture(name, used, Recipe::Color(factor)),
@@ -194,7 +192,6 @@ impl<'a> Translator<'a> {
         }
     }
 
-    /// Width of the microfacet distribution.
     fn roughness(&mut self, alpha: f32) -> String {
         let width = match self.subject.width(alpha) {
             Some((used, recipe)) => self.texture("roughness", used, recipe),

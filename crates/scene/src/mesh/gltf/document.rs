@@ -82,7 +82,6 @@ pub(super) fn parse(
     Ok((document, glb.and_then(|glb| glb.bin).map(|bin| bin.into_owned()), json))
 }
 
-/// Reads all buffers of a document.
 pub(super) fn read_buffers(
     path: &Path,
     document: &Document,
@@ -161,7 +160,6 @@ fn remove_extras(value: &mut Value) {
     }
 }
 
-/// Decodes the percent encoding of a relative URI.
 fn decode_percent(uri: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();

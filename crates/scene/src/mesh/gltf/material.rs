@@ -19,7 +19,6 @@ use crate::{
     texture::{Channels, Encoding, TextureUse, texelwise::lie_alike},
 };
 
-/// Colours of an image.
 const COLOR: (Channels, Encoding) = (Channels::Color, Encoding::Srgb);
 /// Channels that hold numbers.
 const RED: (Channels, Encoding) = (Channels::Red, Encoding::Linear);
@@ -59,7 +58,6 @@ pub(super) fn vector<const N: usize>(json: &Value, key: &str, default: [f32; N])
     vector
 }
 
-/// Reads a number from 0 to 1.
 fn share(json: &Value, key: &str, default: f32) -> f32 {
     number(json, key, default).clamp(0.0, 1.0)
 }

@@ -13,7 +13,6 @@ use crate::error::Result;
 /// Bytes of a matrix of singles.
 const MATRIX_BYTES: usize = 64;
 
-/// Placement of a primitive.
 pub(super) enum Place<'j> {
     Node(Mat4),
     Joints(&'j [Mat4]),

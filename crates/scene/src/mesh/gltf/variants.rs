@@ -5,7 +5,6 @@ use serde_json::Value;
 
 const EXTENSION: &str = "KHR_materials_variants";
 
-/// Names of the variants of a document.
 pub(super) fn names(json: &Value) -> Vec<String> {
     let variants = json["extensions"][EXTENSION]["variants"].as_array();
     let name = |variant: &Value| variant["name"].as_str().unwrap_or_default().to_owned();

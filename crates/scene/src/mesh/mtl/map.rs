@@ -7,7 +7,6 @@ use crate::{
     texture::{Channels, Encoding, Texture, TextureUse, Wrap},
 };
 
-/// Image of a material.
 pub(super) struct Map {
     pub(super) path: PathBuf,
     /// Library and line.
