@@ -86,28 +86,31 @@ impl Model {
 
 impl Reader {
     pub(super) fn model(&mut self, node: Node<'_>) -> Result<Model> {
-        self.nested(node, MAX_DEPTH)
+        if self.models_around == MAX_DEPTH {
+            return Err(node.error("a bsdf contains itself, or is nested too deep"));
+        }
+        self.models_around += 1;
+        let model = self.model_of(node);
+        self.models_around -= 1;
+        model
     }
 
-    pub(super) fn nested(&mut self, node: Node<'_>, depth_left: usize) -> Result<Model> {
-        let Some(depth_left) = depth_left.checked_sub(1) else {
-            return Err(node.error("a bsdf contains itself, or is nested too deep"));
-        };
+    fn model_of(&mut self, node: Node<'_>) -> Result<Model> {
         let parameters = Parameters::new(node);
         let model = match current_name(node.kind()) {
-            "twosided" => self.two_sided(&parameters, depth_left)?,
-            "mask" => self.mask(&parameters, depth_left)?,
-            "blendbsdf" => self.blend(&parameters, depth_left)?,
-            "mixturebsdf" => self.mixture(&parameters, depth_left)?,
-            "coating" | "roughcoating" => self.coating(&parameters, depth_left)?,
+            "twosided" => self.two_sided(&parameters)?,
+            "mask" => self.mask(&parameters)?,
+            "blendbsdf" => self.blend(&parameters)?,
+            "mixturebsdf" => self.mixture(&parameters)?,
+            "coating" | "roughcoating" => self.coating(&parameters)?,
             "bumpmap" | "bump" => {
                 self.ignored.add(features::MI_BUMP_MAP, || node.place());
-                let model = self.inner(&parameters, depth_left)?;
+                let model = self.inner(&parameters)?;
                 parameters.without_effect(&["arbitrary", "scale"]);
                 parameters.objects("texture")?;
                 model
             }
-            "normalmap" => self.normal_map(&parameters, depth_left)?,
+            "normalmap" => self.normal_map(&parameters)?,
             "null" => Model {
                 kind: MaterialKind::Diffuse { reflectance: Vec3::ZERO },
                 surface: Surface {
@@ -160,13 +163,9 @@ impl Reader {
         Ok(model)
     }
 
-    pub(super) fn inner(
-        &mut self,
-        parameters: &Parameters<'_>,
-        depth_left: usize,
-    ) -> Result<Model> {
+    pub(super) fn inner(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
         match parameters.objects("bsdf")?.first() {
-            Some(&inner) => self.nested(inner, depth_left),
+            Some(&inner) => self.model(inner),
             None => {
                 let kind = parameters.node.kind();
                 Err(parameters.node.error(format!("{kind}: expected a bsdf in it, found none")))
@@ -174,8 +173,8 @@ impl Reader {
         }
     }
 
-    fn two_sided(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
-        let mut model = self.inner(parameters, depth_left)?;
+    fn two_sided(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+        let mut model = self.inner(parameters)?;
         if let Some(second) = parameters.objects("bsdf")?.get(1) {
             self.ignored.add(features::MI_TWO_MODELS, || second.place());
         }
@@ -183,8 +182,8 @@ impl Reader {
         Ok(model)
     }
 
-    fn mask(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
-        let mut model = self.inner(parameters, depth_left)?;
+    fn mask(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+        let mut model = self.inner(parameters)?;
         let opacity = self.value_or(parameters, "opacity", Role::Reflectance, 0.5)?;
         self.cut(&mut model, parameters.node, opacity);
         Ok(model)
@@ -204,8 +203,8 @@ impl Reader {
         }
     }
 
-    fn normal_map(&mut self, parameters: &Parameters<'_>, depth_left: usize) -> Result<Model> {
-        let mut model = self.inner(parameters, depth_left)?;
+    fn normal_map(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+        let mut model = self.inner(parameters)?;
         parameters.without_effect(&["flip_invalid_normals", "use_shadowing_function"]);
         match self.value(parameters, "normalmap", Role::Index)? {
             Some(Value::Texture(texture)) => model.surface.normal = Some(*texture),

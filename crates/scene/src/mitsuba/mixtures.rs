@@ -24,18 +24,14 @@ use crate::{
 impl Reader {
     /// Mixture of two models: an opacity if one of them is `null`, else the greater of them if they do
     /// not mix.
-    pub(super) fn blend(
-        &mut self,
-        parameters: &Parameters<'_>,
-        depth_left: usize,
-    ) -> Result<Model> {
+    pub(super) fn blend(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
         let node = parameters.node;
         let [first, second] = parameters.objects("bsdf")?[..] else {
             return Err(node.error("blendbsdf: expected two bsdfs in it"));
         };
         let weight = self.value_or(parameters, "weight", Role::Reflectance, 0.5)?;
         if second.kind() == "null" {
-            let mut model = self.nested(first, depth_left)?;
+            let mut model = self.model(first)?;
             let opacity = match weight {
                 Value::Color(weight) | Value::Vertices(weight) => Value::Color(Vec3::ONE - weight),
                 Value::Texture(texture) => {
@@ -46,11 +42,11 @@ impl Reader {
             return Ok(model);
         }
         if first.kind() == "null" {
-            let mut model = self.nested(second, depth_left)?;
+            let mut model = self.model(second)?;
             self.cut(&mut model, node, weight);
             return Ok(model);
         }
-        let [first, second] = [self.nested(first, depth_left)?, self.nested(second, depth_left)?];
+        let [first, second] = [self.model(first)?, self.model(second)?];
         let share = match weight {
             Value::Texture(image) => Share::Image(*image),
             Value::Color(weight) | Value::Vertices(weight) => {
@@ -81,11 +77,7 @@ impl Reader {
     }
 
     /// Mixture of models by weights, of version 0.6.
-    pub(super) fn mixture(
-        &mut self,
-        parameters: &Parameters<'_>,
-        depth_left: usize,
-    ) -> Result<Model> {
+    pub(super) fn mixture(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
         let node = parameters.node;
         let weights = values::numbers(node, parameters.string("weights")?.unwrap_or_default())?;
         let models = parameters.objects("bsdf")?;
@@ -94,7 +86,7 @@ impl Reader {
         }
         let (mut sum, mut mixed) = (0.0, None);
         for (model, weight) in models.into_iter().zip(weights) {
-            let model = self.nested(model, depth_left)?;
+            let model = self.model(model)?;
             sum += weight.max(0.0);
             let share = if sum > 0.0 { weight.max(0.0) / sum } else { 0.0 };
             mixed = Some(match mixed {
@@ -109,12 +101,8 @@ impl Reader {
     }
 
     /// Coat of version 0.6 on another model: a plastic on a diffuse one.
-    pub(super) fn coating(
-        &mut self,
-        parameters: &Parameters<'_>,
-        depth_left: usize,
-    ) -> Result<Model> {
-        let mut model = self.inner(parameters, depth_left)?;
+    pub(super) fn coating(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+        let mut model = self.inner(parameters)?;
         let Width { alpha, texture } = if parameters.node.kind() == "coating" {
             Width { alpha: MIN_ALPHA, texture: None }
         } else {

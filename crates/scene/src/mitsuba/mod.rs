@@ -52,6 +52,8 @@ struct Reader {
     materials: Vec<Material>,
     /// Material by the elements of its model and of its light.
     material_numbers: HashMap<[Option<usize>; 3], u32>,
+    /// Models around the one that is read.
+    models_around: usize,
     geometry: Geometry,
     /// Shapes of groups by their element.
     shapes: HashMap<usize, Arc<Shape>>,

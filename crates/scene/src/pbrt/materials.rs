@@ -35,6 +35,8 @@ const SOLID_IOR: (f32, f32) = (0.1, 10.0);
 pub(super) struct Materials<'a> {
     pub description: &'a Description,
     pub textures: Textures<'a>,
+    /// Mixtures around the material that is made.
+    depth: usize,
 }
 
 /// Width of the microfacet distribution, constant or by place.
@@ -46,7 +48,7 @@ struct Roughness {
 
 impl<'a> Materials<'a> {
     pub(super) fn new(description: &'a Description, textures: Textures<'a>) -> Self {
-        Self { description, textures }
+        Self { description, textures, depth: 0 }
     }
 
     /// Makes the material that a shape takes; none for a surface that is not there.
@@ -61,10 +63,10 @@ impl<'a> Materials<'a> {
             }
             MaterialChoice::Own(entity) => {
                 let name = format!("{} of line {}", entity.name, entity.place.line);
-                self.of_entity(entity, &entity.name, name, 0)
+                self.of_entity(entity, &entity.name, name)
             }
             MaterialChoice::Named(name, place) => match self.description.materials.get(&**name) {
-                Some(entity) => self.named(name, entity, 0),
+                Some(entity) => self.named(name, entity),
                 None => {
                     let message = format!("NamedMaterial \"{name}\": there is no such material");
                     Err(place.error(message))
@@ -73,20 +75,14 @@ impl<'a> Materials<'a> {
         }
     }
 
-    fn named(&mut self, name: &str, entity: &Entity, depth: usize) -> Result<Option<Material>> {
+    fn named(&mut self, name: &str, entity: &Entity) -> Result<Option<Material>> {
         let Some(kind) = entity.string("type")? else {
             return Err(entity.error("expected a `type`"));
         };
-        self.of_entity(entity, kind, name.to_owned(), depth)
+        self.of_entity(entity, kind, name.to_owned())
     }
 
-    fn of_entity(
-        &mut self,
-        entity: &Entity,
-        kind: &str,
-        name: String,
-        depth: usize,
-    ) -> Result<Option<Material>> {
+    fn of_entity(&mut self, entity: &Entity, kind: &str, name: String) -> Result<Option<Material>> {
         let mut surface = Surface::default();
         let kind = match kind {
             "diffuse" => self.diffuse(entity, "reflectance", 0.5, 1.0, &mut surface)?,
@@ -146,7 +142,7 @@ impl<'a> Materials<'a> {
                 }
                 MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) }
             }
-            "mix" => return self.mix(entity, name, depth),
+            "mix" => return self.mix(entity, name),
             "interface" | "none" | "" => return Ok(None),
             "measured" => {
                 let message = "the material `measured` cannot be rendered; choose another, such as \
@@ -311,22 +307,24 @@ impl<'a> Materials<'a> {
 
     /// The mixture, else the material of the greater share; its opacity is the share if the other is
     /// not there.
-    fn mix(&mut self, entity: &Entity, name: String, depth: usize) -> Result<Option<Material>> {
+    fn mix(&mut self, entity: &Entity, name: String) -> Result<Option<Material>> {
         let names = match entity.find_of("materials", &[Kind::Text])?.map(|found| &found.values) {
             Some(Values::Texts(names)) if names.len() == 2 => names,
             _ => return Err(entity.error("expected two names of `materials`")),
         };
-        if depth == MAX_DEPTH {
+        if self.depth == MAX_DEPTH {
             let message = format!("more than {MAX_DEPTH} materials mix one another");
             return Err(entity.error(message));
         }
+        self.depth += 1;
         let mut parts = Vec::new();
         for part in names {
             let Some(part_entity) = self.description.materials.get(part) else {
                 return Err(entity.error(format!("there is no material `{part}`")));
             };
-            parts.push(self.named(part, part_entity, depth + 1)?);
+            parts.push(self.named(part, part_entity)?);
         }
+        self.depth -= 1;
         let (second, first) = (parts.pop().flatten(), parts.pop().flatten());
         let amount = self.textures.number(entity, "amount")?.unwrap_or(Value::number(0.5));
         self.textures.log.unused(entity);

@@ -63,12 +63,14 @@ pub(super) struct Textures<'a> {
     images: HashMap<(PathBuf, String), Arc<Texture>>,
     /// Values of named textures, those of numbers apart.
     values: HashMap<(bool, String), Value>,
+    /// Textures that refer to the one that is read.
+    depth: usize,
 }
 
 impl<'a> Textures<'a> {
     /// Takes the textures of `description`; paths are relative to `folder`.
     pub(super) fn new(description: &'a Description, folder: &'a Folder, log: Log<'a>) -> Self {
-        Self { description, folder, log, images: HashMap::new(), values: HashMap::new() }
+        Self { description, folder, log, images: HashMap::new(), values: HashMap::new(), depth: 0 }
     }
 
     /// Spectrum of a parameter, constant or textured, if it is given.
@@ -76,7 +78,7 @@ impl<'a> Textures<'a> {
     /// # Errors
     /// With the place for unknown names, other types and images that cannot be read.
     pub(super) fn spectrum(&mut self, entity: &Entity, name: &str) -> Result<Option<Value>> {
-        self.value(entity, name, false, 0)
+        self.value(entity, name, false)
     }
 
     /// Number of a parameter, constant or textured, if it is given.
@@ -84,16 +86,10 @@ impl<'a> Textures<'a> {
     /// # Errors
     /// As [`Textures::spectrum`].
     pub(super) fn number(&mut self, entity: &Entity, name: &str) -> Result<Option<Value>> {
-        self.value(entity, name, true, 0)
+        self.value(entity, name, true)
     }
 
-    fn value(
-        &mut self,
-        entity: &Entity,
-        name: &str,
-        is_number: bool,
-        depth: usize,
-    ) -> Result<Option<Value>> {
+    fn value(&mut self, entity: &Entity, name: &str, is_number: bool) -> Result<Option<Value>> {
         let kinds: &[Kind] = if is_number {
             &[Kind::Float, Kind::Integer, Kind::Texture]
         } else {
@@ -101,7 +97,7 @@ impl<'a> Textures<'a> {
         };
         let Some(parameter) = entity.find_of(name, kinds)? else { return Ok(None) };
         Ok(Some(match parameter.kind {
-            Kind::Texture => self.named(parameter, is_number, depth)?,
+            Kind::Texture => self.named(parameter, is_number)?,
             Kind::Float | Kind::Integer => {
                 Value::number(parameter.numbers().first().copied().unwrap_or(0.0))
             }
@@ -110,7 +106,7 @@ impl<'a> Textures<'a> {
     }
 
     /// Texture that a parameter names.
-    fn named(&mut self, parameter: &Parameter, is_number: bool, depth: usize) -> Result<Value> {
+    fn named(&mut self, parameter: &Parameter, is_number: bool) -> Result<Value> {
         let name = parameter.text();
         let textures = if is_number {
             &self.description.float_textures
@@ -122,7 +118,7 @@ impl<'a> Textures<'a> {
             let message = format!("parameter `{}`: there is no {kind} texture", parameter.name);
             return Err(parameter.place.error(format!("{message} `{name}`")));
         };
-        if depth == MAX_DEPTH {
+        if self.depth == MAX_DEPTH {
             let message = format!("more than {MAX_DEPTH} textures refer to one another");
             return Err(entity.error(message));
         }
@@ -130,15 +126,17 @@ impl<'a> Textures<'a> {
         if let Some(value) = self.values.get(&key) {
             return Ok(value.clone());
         }
-        let value = self.texture(entity, is_number, depth + 1)?;
+        self.depth += 1;
+        let value = self.texture(entity, is_number)?;
+        self.depth -= 1;
         self.log.unused(entity);
         self.values.insert(key, value.clone());
         Ok(value)
     }
 
-    fn texture(&mut self, entity: &Entity, is_number: bool, depth: usize) -> Result<Value> {
+    fn texture(&mut self, entity: &Entity, is_number: bool) -> Result<Value> {
         let of = |this: &mut Self, name: &str, otherwise: f64| {
-            let value = this.value(entity, name, is_number, depth)?;
+            let value = this.value(entity, name, is_number)?;
             Ok(value.unwrap_or(Value::number(otherwise)))
         };
         match entity.name.as_str() {
@@ -146,7 +144,7 @@ impl<'a> Textures<'a> {
             "constant" => of(self, "value", 1.0),
             "scale" => {
                 let texture = of(self, "tex", 1.0)?;
-                let scale = self.value(entity, "scale", true, depth)?;
+                let scale = self.value(entity, "scale", true)?;
                 Ok(match (texture, scale.unwrap_or(Value::number(1.0))) {
                     (Value::Constant(factor), other) | (other, Value::Constant(factor)) => {
                         other.affine(factor, Vec3::ZERO)
@@ -159,7 +157,7 @@ impl<'a> Textures<'a> {
             }
             "mix" | "directionmix" => {
                 let (first, second) = (of(self, "tex1", 0.0)?, of(self, "tex2", 1.0)?);
-                let amount = match self.value(entity, "amount", true, depth)? {
+                let amount = match self.value(entity, "amount", true)? {
                     Some(Value::Constant(amount)) => amount.x,
                     Some(Value::Image(_)) => {
                         self.log.ignore(features::PBRT_TEXTURE_MIX, &entity.place);
