@@ -136,24 +136,17 @@ impl Study<'_> {
             width: scene.film.width,
             height: scene.film.height,
             triangles: scene.geometry.triangle_count(),
-            reference: None,
-            reference_check: None,
-            parts: None,
+            ..StudiedScene::default()
         });
         if self.plan.compares() {
+            let studied = results.scenes.len() - 1;
             let reference = self.reference(scene, &mut buffers)?;
-            if let Some(studied) = results.scenes.last_mut() {
-                studied.reference = Some(reference.own.clone());
-            }
+            results.scenes[studied].reference = Some(reference.own.clone());
             let check = self.check_reference(scene, &mut buffers, &reference)?;
-            if let Some(studied) = results.scenes.last_mut() {
-                studied.reference_check = check;
-            }
+            results.scenes[studied].reference_check = check;
             let make = &mut || buffers.session(mask_settings());
             let surfaces = Surfaces::of(self.folder, scene, &reference, make)?;
-            if let Some(studied) = results.scenes.last_mut() {
-                studied.parts = Some(surfaces.own);
-            }
+            results.scenes[studied].parts = Some(surfaces.own);
             self.compare(scene, &mut buffers, (&reference, &surfaces), results)?;
         }
         if let Some(overhead) = &self.plan.overhead {

@@ -1,8 +1,10 @@
 //! The window: events of the display → input of the rendering thread.
 
 use std::{
+    cell::RefCell,
     collections::BTreeSet,
     path::PathBuf,
+    rc::Rc,
     sync::{
         Arc,
         mpsc::{Receiver, Sender, channel},
@@ -385,6 +387,7 @@ fn render(
     let left = Side::new(&device, &scene, None, &settings, None)?;
     let size = window.inner_size();
     let panel = Panel::new(&device, window, [size.width, size.height], projector, inputs, tone)?;
+    let panel = Rc::new(RefCell::new(panel));
     let announce = Box::new(move |status| {
         let _ = proxy.send_event(Report::Status(Box::new(status)));
     });

@@ -66,9 +66,9 @@ impl Worker {
         match action {
             Action::Sampler(number) => self.choose_sampler(number)?,
             Action::Depth(more) => {
-                let depth = self.settings.depth.saturating_add_signed(more).clamp(1, 64);
-                if depth != self.settings.depth {
-                    self.settings.depth = depth;
+                let depth = self.parts.settings.depth.saturating_add_signed(more).clamp(1, 64);
+                if depth != self.parts.settings.depth {
+                    self.parts.settings.depth = depth;
                     self.remake()?;
                 }
             }
@@ -87,9 +87,9 @@ impl Worker {
             }
             Action::Layer(layer) => self.toggle_layer(layer)?,
             Action::NextLayer => {
-                let now = self.panel.borrow().layer;
+                let now = self.parts.panel.borrow().layer;
                 let at = LAYERS.iter().position(|(layer, ..)| *layer == now).unwrap_or(0);
-                self.panel.borrow_mut().layer = LAYERS[(at + 1) % LAYERS.len()].0;
+                self.parts.panel.borrow_mut().layer = LAYERS[(at + 1) % LAYERS.len()].0;
                 self.show_again()?;
             }
             Action::Inset => {
@@ -103,7 +103,7 @@ impl Worker {
                 return Ok(true);
             }
             Action::Bookmark => {
-                let [.., file] = names(&self.folder, &self.scene.name);
+                let [.., file] = names(&self.parts.folder, &self.parts.scene.name);
                 let written = write_text(&file, &camera_toml(&self.rig.camera));
                 self.notice_written(written, &[file]);
             }
@@ -152,14 +152,14 @@ impl Worker {
 
     /// Focuses on the point that was clicked, once the whole film has samples there.
     pub(super) fn focus(&mut self) -> Result<()> {
-        if self.motion != Motion::Rest || self.is_stopped() || self.left.sample_count() == 0 {
+        if self.motion != Motion::Rest || self.is_stopped() || self.parts.left.sample_count() == 0 {
             return Ok(());
         }
         let Some(at) = self.clicked.take() else { return Ok(()) };
-        let film = self.left.session.renderer.film_size();
-        let pixel = self.panel.borrow().projector.pixel_under(at, film);
+        let film = self.parts.left.session.renderer.film_size();
+        let pixel = self.parts.panel.borrow().projector.pixel_under(at, film);
         let Some([x, y]) = pixel else { return Ok(()) };
-        let points = self.left.points()?;
+        let points = self.parts.left.points()?;
         match points.get((y * film[0] + x) as usize) {
             Some(Some(point)) => {
                 self.rig.focus(*point);
@@ -188,7 +188,7 @@ impl Worker {
                 self.notice = error.to_string();
             }
         }
-        self.views = views(&self.folder, &self.scene.name);
+        self.views = views(&self.parts.folder, &self.parts.scene.name);
         self.tell();
     }
 
@@ -199,7 +199,7 @@ impl Worker {
     }
 
     fn toggle_layer(&mut self, layer: u32) -> Result<()> {
-        let mut panel = self.panel.borrow_mut();
+        let mut panel = self.parts.panel.borrow_mut();
         panel.layer = if panel.layer == layer { SHOW_PICTURE } else { layer };
         drop(panel);
         self.show_again()
@@ -211,9 +211,9 @@ impl Worker {
             self.right = None;
             let side = self.make_side(sampler)?;
             self.right = Some(side);
-        } else if sampler != self.left.sampler {
+        } else if sampler != self.parts.left.sampler {
             self.keep_guide()?;
-            self.left = self.make_side(sampler)?;
+            self.parts.left = self.make_side(sampler)?;
         }
         self.look(self.whole(), true)
     }
@@ -221,7 +221,7 @@ impl Worker {
     /// Makes all renderers again, with settings that changed.
     fn remake(&mut self) -> Result<()> {
         self.keep_guide()?;
-        self.left = self.make_side(self.left.sampler)?;
+        self.parts.left = self.make_side(self.parts.left.sampler)?;
         if self.right.take().is_some() {
             let side = self.make_side(self.right_sampler)?;
             self.right = Some(side);
@@ -231,17 +231,17 @@ impl Worker {
 
     /// Keeps what the left side has learned for the next renderer.
     fn keep_guide(&mut self) -> Result<()> {
-        self.guide = self.left.session.renderer.guide()?.or(self.guide.take());
+        self.guide = self.parts.left.session.renderer.guide()?.or(self.guide.take());
         Ok(())
     }
 
     fn make_side(&self, sampler: Sampler) -> Result<Side> {
-        let title = format!("{} | preparing {}", self.scene.name, sampler.name());
-        (self.announce)(self.status(title));
-        let settings = Settings { sampler, ..self.settings.clone() };
-        let buffers = Some(self.left.session.renderer.scene_buffers());
+        let title = format!("{} | preparing {}", self.parts.scene.name, sampler.name());
+        (self.parts.announce)(self.status(title));
+        let settings = Settings { sampler, ..self.parts.settings.clone() };
+        let buffers = Some(self.parts.left.session.renderer.scene_buffers());
         let guide = self.guide.as_deref();
-        let mut side = Side::new(&self.device, &self.scene, buffers, &settings, guide)?;
+        let mut side = Side::new(&self.parts.device, &self.parts.scene, buffers, &settings, guide)?;
         side.session.renderer.set_watch(self.watch());
         Ok(side)
     }
@@ -250,12 +250,12 @@ impl Worker {
         if self.shows_inset {
             if self.motion == Motion::Rest && !self.is_stopped() {
                 self.draw_inset()?;
-                self.panel.borrow_mut().present()?;
+                self.parts.panel.borrow_mut().present()?;
             }
         } else {
-            let mut panel = self.panel.borrow_mut();
+            let mut panel = self.parts.panel.borrow_mut();
             panel.projector.set_inset(&Inset::default())?;
-            if self.left.sample_count() > 0 {
+            if self.parts.left.sample_count() > 0 {
                 panel.present()?;
             }
         }
@@ -264,28 +264,28 @@ impl Worker {
 
     /// Draws what the pixel under the pointer has learned, into the inset.
     pub(super) fn draw_inset(&mut self) -> Result<()> {
-        let film = self.left.session.renderer.film_size();
-        let panel = self.panel.borrow();
+        let film = self.parts.left.session.renderer.film_size();
+        let panel = self.parts.panel.borrow();
         let pixel = panel.pointer.and_then(|at| panel.projector.pixel_under(at, film));
         drop(panel);
         let recorded = match pixel {
-            Some(pixel) => self.left.session.renderer.inspect_pixel(pixel)?,
+            Some(pixel) => self.parts.left.session.renderer.inspect_pixel(pixel)?,
             None => None,
         };
-        let drawn = recorded.and_then(|recorded| inset::draw(&self.scene, recorded.as_ref()));
-        self.panel.borrow_mut().projector.set_inset(&drawn.unwrap_or_default())
+        let drawn = recorded.and_then(|recorded| inset::draw(&self.parts.scene, recorded.as_ref()));
+        self.parts.panel.borrow_mut().projector.set_inset(&drawn.unwrap_or_default())
     }
 
     /// Writes the window, the film and the camera, and says where.
     pub(super) fn save(&mut self) -> Result<()> {
-        if self.left.sample_count() == 0 {
+        if self.parts.left.sample_count() == 0 {
             self.saves_at_rest = true;
             return Ok(());
         }
-        let (size, pixels) = self.panel.borrow_mut().picture()?;
-        let film = self.left.session.image(&[])?;
+        let (size, pixels) = self.parts.panel.borrow_mut().picture()?;
+        let film = self.parts.left.session.image(&[])?;
         let camera = &self.rig.camera;
-        let files = names(&self.folder, &self.scene.name);
+        let files = names(&self.parts.folder, &self.parts.scene.name);
         let saved = Saved { size, pixels: &pixels, film: &film, camera };
         let written = saved.write(&files);
         self.notice_written(written, &files);

@@ -69,13 +69,7 @@ enum Motion {
 
 /// Everything that the rendering thread has.
 pub(crate) struct Worker {
-    scene: Scene,
-    device: Arc<Device>,
-    settings: Settings,
-    /// Samples per pixel at which a film is finished.
-    spp: u32,
-    panel: Rc<RefCell<Panel>>,
-    left: Side,
+    parts: Parts,
     right: Option<Side>,
     /// Sampler of the right side when it is shown next.
     right_sampler: Sampler,
@@ -107,8 +101,6 @@ pub(crate) struct Worker {
     /// Files of cameras that were written.
     views: Vec<PathBuf>,
     notice: String,
-    folder: PathBuf,
-    announce: Box<dyn Fn(Status)>,
 }
 
 pub(super) struct Parts {
@@ -122,7 +114,7 @@ pub(super) struct Parts {
     /// Its side, made before the window was connected.
     pub left: Side,
     /// The window.
-    pub panel: Panel,
+    pub panel: Rc<RefCell<Panel>>,
     /// Folder of the files that are written.
     pub folder: PathBuf,
     /// Shows what the renderer does.
@@ -131,16 +123,11 @@ pub(super) struct Parts {
 
 impl Worker {
     pub(crate) fn new(parts: Parts) -> Self {
-        let Parts { scene, device, settings, spp, left, panel, folder, announce } = parts;
-        let is_software = device.capabilities().kind == "software";
+        let is_software = parts.device.capabilities().kind == "software";
         let mut worker = Self {
-            rig: Rig::new(scene.camera),
-            scene,
-            device,
-            settings,
-            spp,
-            panel: Rc::new(RefCell::new(panel)),
-            left,
+            rig: Rig::new(parts.scene.camera),
+            views: views(&parts.folder, &parts.scene.name),
+            parts,
             right: None,
             right_sampler: Sampler::Mis,
             chooses_right: false,
@@ -160,20 +147,16 @@ impl Worker {
             error_at: Instant::now(),
             denoising: Denoising::default(),
             clicked: None,
-            views: Vec::new(),
             notice: String::new(),
-            folder,
-            announce,
         };
         let watch = worker.watch();
-        worker.left.session.renderer.set_watch(watch);
-        worker.views = views(&worker.folder, &worker.scene.name);
+        worker.parts.left.session.renderer.set_watch(watch);
         worker
     }
 
     /// Attends to the window between the waves of a pass.
     fn watch(&self) -> Watch {
-        let panel = Rc::clone(&self.panel);
+        let panel = Rc::clone(&self.parts.panel);
         Box::new(move |_| {
             let mut panel = panel.borrow_mut();
             panel.attend() && !panel.is_moving
@@ -188,9 +171,9 @@ impl Worker {
         self.tell();
         let mut last = Instant::now();
         loop {
-            self.panel.borrow_mut().attend();
-            self.panel.borrow_mut().take_failure()?;
-            if std::mem::take(&mut self.panel.borrow_mut().is_changed) {
+            self.parts.panel.borrow_mut().attend();
+            self.parts.panel.borrow_mut().take_failure()?;
+            if std::mem::take(&mut self.parts.panel.borrow_mut().is_changed) {
                 self.tell();
             }
             let now = Instant::now();
@@ -198,7 +181,7 @@ impl Worker {
             last = now;
             let mut moved = false;
             loop {
-                let Some(input) = self.panel.borrow_mut().pending.pop_front() else { break };
+                let Some(input) = self.parts.panel.borrow_mut().pending.pop_front() else { break };
                 match input {
                     Input::Close | Input::Key(Action::Quit) => return Ok(()),
                     input => moved |= self.apply(input)?,
@@ -214,28 +197,28 @@ impl Worker {
                     self.denoising.start_moving();
                 }
                 self.motion = Motion::Moving(Instant::now());
-                self.panel.borrow_mut().is_moving = true;
+                self.parts.panel.borrow_mut().is_moving = true;
                 self.move_on()?;
             } else if let Motion::Moving(since) = self.motion {
                 if since.elapsed() >= REST {
                     self.motion = Motion::Rest;
-                    self.panel.borrow_mut().is_moving = false;
+                    self.parts.panel.borrow_mut().is_moving = false;
                     self.look(self.whole(), true)?;
                 } else if !self.refine()? {
-                    self.panel.borrow_mut().wait(REST / 4);
+                    self.parts.panel.borrow_mut().wait(REST / 4);
                 }
             } else if self.is_stopped() {
                 // Input stopped a pass that nothing has started again.
                 self.look(self.whole(), true)?;
             } else if !self.refine()? {
-                self.panel.borrow_mut().wait(Duration::from_secs(1));
+                self.parts.panel.borrow_mut().wait(Duration::from_secs(1));
                 last = Instant::now();
             }
         }
     }
 
     fn sides(&mut self) -> impl Iterator<Item = &mut Side> {
-        [Some(&mut self.left), self.right.as_mut()].into_iter().flatten()
+        [Some(&mut self.parts.left), self.right.as_mut()].into_iter().flatten()
     }
 
     fn is_stopped(&mut self) -> bool {
@@ -244,13 +227,13 @@ impl Worker {
 
     /// Width and height of the whole film.
     fn whole(&self) -> [u32; 2] {
-        [self.scene.film.width, self.scene.film.height]
+        [self.parts.scene.film.width, self.parts.scene.film.height]
     }
 
     /// Starts all films again through the camera of now.
     fn look(&mut self, size: [u32; 2], learns: bool) -> Result<()> {
         self.looks = self.looks.wrapping_add(1);
-        let [seed, ..] = hash_4d([self.settings.seed, self.looks, MOVED_SEED, 0]);
+        let [seed, ..] = hash_4d([self.parts.settings.seed, self.looks, MOVED_SEED, 0]);
         self.error = None;
         let camera = self.rig.camera;
         let start = Instant::now();
@@ -278,7 +261,7 @@ impl Worker {
             side.session.pass(1, f64::INFINITY)?;
         }
         if self.adapted_at.elapsed() >= ADAPT_INTERVAL {
-            self.rig.adapt(self.left.points()?.into_iter().flatten());
+            self.rig.adapt(self.parts.left.points()?.into_iter().flatten());
             self.adapted_at = Instant::now();
         }
         self.show()?;
@@ -293,7 +276,7 @@ impl Worker {
 
     /// Renders a pass of the side that had less time, and shows it. Returns false if all is done.
     fn refine(&mut self) -> Result<bool> {
-        let spp = self.spp;
+        let spp = self.parts.spp;
         let side = self
             .sides()
             .filter(|side| side.sample_count() < spp)
@@ -313,10 +296,10 @@ impl Worker {
 
     /// Takes over what the films show, and shows it.
     fn show(&mut self) -> Result<()> {
-        let layer = self.panel.borrow().layer;
+        let layer = self.parts.panel.borrow().layer;
         let is_due = self.looked_at.is_none_or(|at| at.elapsed() >= LOOK_INTERVAL);
-        if is_due && layer == SHOW_ERROR && self.left.sample_count() > 0 {
-            let sums = self.left.session.renderer.sums()?;
+        if is_due && layer == SHOW_ERROR && self.parts.left.sample_count() > 0 {
+            let sums = self.parts.left.session.renderer.sums()?;
             let total: f64 =
                 (0..sums.pixel_count()).map(|i| sums.mean(i).iter().sum::<f64>()).sum();
             self.mean_radiance = (total / (3.0 * sums.pixel_count() as f64)) as f32;
@@ -329,13 +312,14 @@ impl Worker {
         self.look_at_error()?;
         let mean = self.mean_radiance;
         let denoises = layer == SHOW_PICTURE && self.denoises();
-        let mut panel = self.panel.borrow_mut();
+        let mut panel = self.parts.panel.borrow_mut();
         panel.has_right = self.right.is_some();
-        for (side, place) in [(Some(&self.left), Place::Left), (self.right.as_ref(), Place::Right)]
+        for (side, place) in
+            [(Some(&self.parts.left), Place::Left), (self.right.as_ref(), Place::Right)]
         {
             // A film without a sample goes on showing what was there before.
             if let Some(side) = side.filter(|side| side.sample_count() > 0) {
-                let has_ended = side.sample_count() >= self.spp;
+                let has_ended = side.sample_count() >= self.parts.spp;
                 let denoised =
                     if denoises { self.denoising.filter(side, place, has_ended)? } else { None };
                 match denoised {
@@ -359,11 +343,11 @@ impl Worker {
 
     /// Takes the error of the film at rest from its sums, from time to time and at its end.
     fn look_at_error(&mut self) -> Result<()> {
-        let has_ended = self.left.sample_count() >= self.spp;
+        let has_ended = self.parts.left.sample_count() >= self.parts.spp;
         let is_due = has_ended || self.error_at.elapsed() >= ERROR_INTERVAL;
-        let is_shown = self.panel.borrow().projector.has_overlay();
-        if is_due && is_shown && self.motion == Motion::Rest && self.left.sample_count() > 1 {
-            self.error = Some(self.left.session.renderer.sums()?.relative_standard_error());
+        let is_shown = self.parts.panel.borrow().projector.has_overlay();
+        if is_due && is_shown && self.motion == Motion::Rest && self.parts.left.sample_count() > 1 {
+            self.error = Some(self.parts.left.session.renderer.sums()?.relative_standard_error());
             self.error_at = Instant::now();
         }
         Ok(())
@@ -371,14 +355,14 @@ impl Worker {
 
     /// Tells title and controls what is shown.
     fn tell(&self) {
-        (self.announce)(self.status(self.title()));
+        (self.parts.announce)(self.status(self.title()));
     }
 
     /// State of everything that the controls show.
     fn status(&self, title: String) -> Status {
-        let samples = self.left.sample_count();
+        let samples = self.parts.left.sample_count();
         let share = 1.0 / f64::from(samples.max(1));
-        let times = &self.left.session.renderer.totals().gpu_ms;
+        let times = &self.parts.left.session.renderer.totals().gpu_ms;
         let mut pass_ms: Vec<(String, f64)> =
             times.iter().map(|(name, ms)| (name.clone(), ms * share)).collect();
         pass_ms.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -389,15 +373,15 @@ impl Worker {
         };
         Status {
             title,
-            sampler: if self.chooses_right { self.right_sampler } else { self.left.sampler },
+            sampler: if self.chooses_right { self.right_sampler } else { self.parts.left.sampler },
             is_split: self.right.is_some(),
-            depth: self.settings.depth,
-            tone: self.panel.borrow().tone,
+            depth: self.parts.settings.depth,
+            tone: self.parts.panel.borrow().tone,
             denoise: self.denoising.choice,
             speed: self.rig.speed,
             camera: self.rig.camera,
-            samples: [samples, self.spp],
-            seconds: self.left.session.seconds(),
+            samples: [samples, self.parts.spp],
+            seconds: self.parts.left.session.seconds(),
             error: self.error,
             pass_ms,
             views: self.views.iter().map(name).collect(),
@@ -411,11 +395,11 @@ impl Worker {
             let samples = side.sample_count();
             format!("{} {samples} spp {:.1} s", side.sampler.name(), side.session.seconds())
         };
-        let mut title = format!("{} | {}", self.scene.name, describe(&self.left));
+        let mut title = format!("{} | {}", self.parts.scene.name, describe(&self.parts.left));
         if let Some(right) = &self.right {
             title += &format!(" | {}", describe(right));
         }
-        let panel = self.panel.borrow();
+        let panel = self.parts.panel.borrow();
         if panel.layer != SHOW_PICTURE {
             let name =
                 LAYERS.iter().find(|(layer, ..)| *layer == panel.layer).map(|(_, name, _)| *name);
@@ -424,7 +408,7 @@ impl Worker {
         if self.motion != Motion::Rest {
             title += " | moving";
         }
-        let Settings { depth, .. } = self.settings;
+        let Settings { depth, .. } = self.parts.settings;
         title + &format!(" | depth {depth}, {:+.1} stops", panel.tone.exposure)
     }
 }

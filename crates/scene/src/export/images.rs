@@ -97,17 +97,14 @@ impl Pictures {
         self.list.iter().enumerate().try_for_each(|(index, picture)| {
             let path = folder.join(picture.bitmap(index).name);
             match picture.stored() {
-                Some(stored) => write_png(&path, &picture.used.texture, stored),
+                Some((bytes, color)) => {
+                    let Texture { width, height, .. } = *picture.used.texture;
+                    write_png(&path, [width, height], &bytes, color)
+                }
                 None => picture.write_exr(&path),
             }
         })
     }
-}
-
-/// Texels without a change, of 8 or 16 bits.
-enum Stored {
-    Bytes(Vec<u8>),
-    Shorts(Vec<u16>),
 }
 
 impl Picture {
@@ -143,7 +140,8 @@ impl Picture {
             && !matches!(self.used.texture.texels, Texels::Halves(_))
     }
 
-    fn stored(&self) -> Option<Stored> {
+    /// Texels without a change, of 8 or 16 bits.
+    fn stored(&self) -> Option<(Vec<u8>, ExtendedColorType)> {
         if !self.is_stored() {
             return None;
         }
@@ -157,11 +155,11 @@ impl Picture {
         match &self.used.texture.texels {
             Texels::Bytes(texels) => {
                 let all = texels.iter().flat_map(|texel| channels.map(|channel| texel[channel]));
-                Some(Stored::Bytes(all.collect()))
+                Some((all.collect(), ExtendedColorType::Rgb8))
             }
             Texels::Shorts(texels) => {
                 let all = texels.iter().flat_map(|texel| channels.map(|channel| texel[channel]));
-                Some(Stored::Shorts(all.collect()))
+                Some((all.flat_map(u16::to_ne_bytes).collect(), ExtendedColorType::Rgb16))
             }
             Texels::Halves(_) => None,
         }
@@ -223,19 +221,15 @@ impl Picture {
     }
 }
 
-fn write_png(path: &Path, texture: &Texture, stored: Stored) -> Result<()> {
+/// Writes an image of 8 bits or of 16, in the order of this machine, per channel.
+pub(super) fn write_png(
+    path: &Path,
+    [width, height]: [u32; 2],
+    bytes: &[u8],
+    color: ExtendedColorType,
+) -> Result<()> {
     files::write_atomically(path, |file| {
-        let encoder = PngEncoder::new(file);
-        let (width, height) = (texture.width, texture.height);
-        let result = match stored {
-            Stored::Bytes(bytes) => {
-                encoder.write_image(&bytes, width, height, ExtendedColorType::Rgb8)
-            }
-            Stored::Shorts(shorts) => {
-                let bytes = bytemuck::cast_slice(&shorts);
-                encoder.write_image(bytes, width, height, ExtendedColorType::Rgb16)
-            }
-        };
-        result.map_err(std::io::Error::other)
+        let written = PngEncoder::new(file).write_image(bytes, width, height, color);
+        written.map_err(std::io::Error::other)
     })
 }

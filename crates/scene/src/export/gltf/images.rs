@@ -3,12 +3,11 @@
 use std::{path::Path, sync::Arc};
 
 use glam::Vec3;
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use image::ExtendedColorType;
 
 use crate::{
     error::Result,
-    export::folder::safe_name,
-    files,
+    export::{folder::safe_name, images::write_png},
     math::colour::{luminance, srgb_from_linear},
     texture::{Channels, Texels, TextureUse},
 };
@@ -99,22 +98,15 @@ impl Sheet {
     /// [`crate::Error::Io`] for a file that cannot be written.
     pub(super) fn write(&self, path: &Path) -> Result<()> {
         let Some(used) = self.sources().next() else { return Ok(()) };
-        let (width, height) = (used.texture.width, used.texture.height);
+        let size = [used.texture.width, used.texture.height];
         let texels = self.texels();
         let stored = texels.iter().flatten();
-        files::write_atomically(path, |file| {
-            let encoder = PngEncoder::new(file);
-            let result = if self.is_of_bytes() {
-                let bytes: Vec<u8> = stored.map(|value| (value * 255.0).round() as u8).collect();
-                encoder.write_image(&bytes, width, height, ExtendedColorType::Rgba8)
-            } else {
-                let shorts: Vec<u16> =
-                    stored.map(|value| (value * 65_535.0).round() as u16).collect();
-                let bytes = bytemuck::cast_slice(&shorts);
-                encoder.write_image(bytes, width, height, ExtendedColorType::Rgba16)
-            };
-            result.map_err(std::io::Error::other)
-        })
+        if self.is_of_bytes() {
+            let bytes: Vec<u8> = stored.map(|value| (value * 255.0).round() as u8).collect();
+            return write_png(path, size, &bytes, ExtendedColorType::Rgba8);
+        }
+        let shorts: Vec<u16> = stored.map(|value| (value * 65_535.0).round() as u16).collect();
+        write_png(path, size, bytemuck::cast_slice(&shorts), ExtendedColorType::Rgba16)
     }
 }
 
