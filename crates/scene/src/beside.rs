@@ -9,7 +9,7 @@ use std::{
 };
 
 /// Folder of a scene, in which names of files start.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Folder {
     pub(crate) path: PathBuf,
     /// Folder that names may reach beside.

@@ -43,7 +43,7 @@ impl Images {
 }
 
 /// Tests whether any texel lets light through.
-pub(super) fn has_alpha(texture: &Texture) -> bool {
+pub(crate) fn has_alpha(texture: &Texture) -> bool {
     match &texture.texels {
         Texels::Bytes(texels) => texels.iter().any(|texel| texel[3] < u8::MAX),
         Texels::Shorts(texels) => texels.iter().any(|texel| texel[3] < u16::MAX),

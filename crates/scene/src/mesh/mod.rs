@@ -5,7 +5,7 @@
 
 mod coincident;
 pub mod gltf;
-mod images;
+pub(crate) mod images;
 mod mtl;
 pub mod obj;
 pub mod ply;

@@ -8,7 +8,7 @@
 use std::{
     collections::HashMap,
     io::{BufRead, BufReader},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use super::{
@@ -42,23 +42,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     // The arrays of a mesh take about as much as its text.
     memory::check(path.display(), file.metadata().map_or(0, |metadata| metadata.len()))
         .map_err(Error::memory)?;
-    let mut reader = ObjReader {
-        path,
-        line: 0,
-        positions: Vec::new(),
-        uvs: Vec::new(),
-        normals: Vec::new(),
-        vertices: Vec::new(),
-        chains: Vec::new(),
-        crowded: HashMap::new(),
-        mesh: Mesh::default(),
-        material_indices: HashMap::new(),
-        library: Vec::new(),
-        library_indices: HashMap::new(),
-        images: Images::default(),
-        ignored: Ignored::default(),
-        first_smoothing: None,
-    };
+    let mut reader = ObjReader { path: path.to_path_buf(), ..ObjReader::default() };
     for_each_line(path, BufReader::with_capacity(1 << 16, file), |line, text| {
         reader.line = line;
         reader.read_line(text, warnings)
@@ -111,8 +95,9 @@ struct Vertex {
     next: u32,
 }
 
-struct ObjReader<'a> {
-    path: &'a Path,
+#[derive(Default)]
+struct ObjReader {
+    path: PathBuf,
     line: usize,
     positions: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
@@ -135,9 +120,9 @@ struct ObjReader<'a> {
     first_smoothing: Option<usize>,
 }
 
-impl ObjReader<'_> {
+impl ObjReader {
     fn error(&self, message: impl Into<String>) -> Error {
-        Error::parse(self.path, self.line, 1, message)
+        Error::parse(&self.path, self.line, 1, message)
     }
 
     fn read_line(&mut self, text: &str, warnings: &mut Vec<String>) -> Result<()> {
@@ -297,7 +282,7 @@ impl ObjReader<'_> {
 
     /// Reads MTL libraries; one line may name several files.
     fn read_library(&mut self, names: &str, warnings: &mut Vec<String>) -> Result<()> {
-        let folder = Folder::of(self.path);
+        let folder = Folder::of(&self.path);
         let names = match folder.file(names) {
             Ok(whole) if whole.is_file() => vec![names],
             _ => names.split_ascii_whitespace().collect(),

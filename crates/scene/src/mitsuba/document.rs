@@ -30,7 +30,7 @@ const MAX_INCLUDES: usize = 256;
 const MAX_VALUE: usize = 1 << 16;
 
 /// Elements of a scene file and those that it includes.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Document {
     elements: Vec<Element>,
     /// Files in the order in which they were met; the scene first.
@@ -153,17 +153,8 @@ impl Document {
     /// [`Error::Parse`] with the line, and errors of reading.
     pub(super) fn read(path: &Path, folder: Folder) -> Result<Self> {
         let mut builder = Builder {
-            document: Self {
-                elements: Vec::new(),
-                files: Vec::new(),
-                folder,
-                search: Vec::new(),
-                version: 3.0,
-                renamed: RefCell::default(),
-                ids: HashMap::new(),
-            },
-            defaults: HashMap::new(),
-            open: Vec::new(),
+            document: Self { folder, version: 3.0, ..Self::default() },
+            ..Builder::default()
         };
         let root = Element {
             tag: "scene".to_owned(),
@@ -237,6 +228,7 @@ impl Missing {
     }
 }
 
+#[derive(Default)]
 struct Builder {
     document: Document,
     defaults: HashMap<String, String>,

@@ -16,6 +16,7 @@ use crate::{
     beside::Folder,
     error::Result,
     features,
+    mesh::images::has_alpha,
     texture::{Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
 };
 
@@ -239,7 +240,7 @@ impl<'a> Textures<'a> {
         if is_number {
             // pbrt takes opacity where the image has it, else the mean of the colours.
             image.channels =
-                if has_opacity(&image.texture) { Channels::Alpha } else { Channels::Color };
+                if has_alpha(&image.texture) { Channels::Alpha } else { Channels::Color };
         }
         let scale = entity.number("scale", 1.0)? as f32;
         let value = Value::Image(image).scaled(scale);
@@ -345,14 +346,6 @@ fn checkerboard(first: Vec3, second: Vec3, ([du, u], [dv, v]): Mapping) -> Textu
         encoding: Encoding::Linear,
         interpolation: Interpolation::Nearest,
         ..TextureUse::new(Arc::new(texture))
-    }
-}
-
-fn has_opacity(texture: &Texture) -> bool {
-    match &texture.texels {
-        Texels::Bytes(texels) => texels.iter().any(|texel| texel[3] != u8::MAX),
-        Texels::Shorts(texels) => texels.iter().any(|texel| texel[3] != u16::MAX),
-        Texels::Halves(texels) => texels.iter().any(|texel| texel[3] != f16::ONE),
     }
 }
 

@@ -25,6 +25,7 @@ pub(super) struct Library<'a> {
 }
 
 /// Material of a library: its keys as they stand.
+#[derive(Default)]
 pub(super) struct LibraryMaterial {
     pub(super) name: String,
     ignored: Ignored,
@@ -51,28 +52,7 @@ pub(super) struct LibraryMaterial {
 
 impl LibraryMaterial {
     fn new(name: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            ignored: Ignored::default(),
-            place: String::new(),
-            diffuse: Vec3::ONE,
-            specular: Vec3::ZERO,
-            exponent: 0.0,
-            ior: None,
-            model: 2,
-            opacity: None,
-            transparency: None,
-            filter: None,
-            emission: None,
-            roughness: None,
-            metallic: None,
-            color_map: None,
-            opacity_map: None,
-            emission_map: None,
-            roughness_map: None,
-            metallic_map: None,
-            normal_map: None,
-        }
+        Self { name: name.to_owned(), diffuse: Vec3::ONE, model: 2, ..Self::default() }
     }
 
     fn ignore(&mut self, feature: Feature, kind: &str) {
