@@ -190,7 +190,6 @@ impl Lights {
         Ok(())
     }
 
-    #[expect(clippy::too_many_arguments, reason = "what `add` has read, and its own")]
     fn infinite(
         &mut self,
         entity: &Entity,
