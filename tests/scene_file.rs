@@ -224,7 +224,7 @@ fn table(all: &str, name: &str) -> String {
 fn kinds(mark: &str, after: &str, suffix: &str) -> Vec<(String, String)> {
     let read = source("file/read.rs");
     let kind = |line: &str| {
-        let (name, rest) = line.trim().strip_prefix('"')?.split_once("\" => ")?;
+        let (name, rest) = line.trim().strip_prefix("(\"")?.split_once("\", ")?;
         let entry = between(rest, mark, after)?;
         Some((name.to_owned(), format!("{entry}{suffix}")))
     };
@@ -261,7 +261,7 @@ fn the_page_has_every_key_of_every_table() {
     }
     section("A texture", "TextureEntry");
     section("`[[object]]`", "ObjectKeys");
-    for (name, entry) in kinds("rest.read::<shapes::", ">", "") {
+    for (name, entry) in kinds("read_shape::<shapes::", ">", "") {
         section(&format!("`[[object]]` with `shape = \"{name}\"`"), &entry);
     }
     section("One of the `balls` of `blobs`", "Blob");

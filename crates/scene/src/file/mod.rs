@@ -136,6 +136,7 @@ pub(crate) struct ObjectKeys {
     pub name: Option<String>,
     /// PLY, OBJ, glTF or GLB file; this or `shape`.
     pub mesh: Option<PathBuf>,
+    /// Procedural shape.
     pub shape: Option<Spanned<String>>,
     /// Name of a material; may be absent where the mesh file brings its own.
     pub material: Option<String>,

@@ -30,6 +30,7 @@ use crate::{
 struct LampKeys {
     /// Name, for messages.
     name: Option<String>,
+    /// Kind.
     r#type: Spanned<String>,
 }
 
