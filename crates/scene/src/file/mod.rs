@@ -135,6 +135,8 @@ pub(crate) struct ObjectEntry {
     pub rotate_deg: [f32; 3],
     /// Translation, metres, applied last.
     pub translate: [f32; 3],
+    /// Group of the light that it emits.
+    pub light_group: Option<String>,
     /// Source of its triangles.
     pub source: ObjectSource,
 }

@@ -47,6 +47,8 @@ struct ObjectKeys {
     /// Translation, metres, applied last.
     #[serde(default)]
     translate: [f32; 3],
+    /// Group of the light that it emits, as that of a lamp.
+    light_group: Option<String>,
 }
 
 /// Keys of every `[[lamp]]`.
@@ -57,6 +59,8 @@ struct LampKeys {
     name: Option<String>,
     /// Kind.
     r#type: Spanned<String>,
+    /// Group of the light in the layers of `--aov LightGroups`. Default: lamps.
+    light_group: Option<String>,
 }
 
 /// Tables that have no kinds.
@@ -169,7 +173,7 @@ fn read_lamp(entry: Spanned<DeValue>, text: &str) -> Result<LampEntry, TextError
             });
         }
     };
-    Ok(LampEntry { line, name: keys.name, kind })
+    Ok(LampEntry { line, name: keys.name, kind, light_group: keys.light_group })
 }
 
 fn read_portal(entry: Spanned<DeValue>, text: &str) -> Result<PortalEntry, TextError> {
@@ -228,6 +232,7 @@ fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextE
         scale: keys.scale.0,
         rotate_deg: keys.rotate_deg,
         translate: keys.translate,
+        light_group: keys.light_group,
         source,
     })
 }

@@ -50,6 +50,7 @@ impl Loader<'_> {
             }
             self.check_placement(&label, object)?;
             self.check_material(&label, object, materials)?;
+            self.check_light_group(&label, object.light_group.as_deref())?;
             *uses.entry(self.mesh_key(object)).or_default() += 1;
         }
         let lacks_material = |object: &&ObjectEntry| object.material.is_none();
@@ -289,6 +290,10 @@ impl Loader<'_> {
             .material
             .as_ref()
             .and_then(|name| materials.iter().position(|material| material.name == *name));
+        let named = match (&object.light_group, named) {
+            (Some(group), Some(named)) => Some(lit_material(named, group, materials)),
+            (_, named) => named,
+        };
         let first_own = materials.len();
         if named.is_none() {
             let colored =
@@ -299,10 +304,15 @@ impl Loader<'_> {
                      to every triangle"
                 )
             })?;
+            let light_group = object.light_group.clone();
             let object = object.name.as_deref().unwrap_or("mesh");
             materials.extend(mesh.materials.iter().map(|MeshMaterial { material, .. }| {
                 let name = format!("{object}/{}", material.name);
-                Material { name, ..material.clone() }
+                let mut own = Material { name, ..material.clone() };
+                if own.surface.emission.is_some() {
+                    own.surface.light_group.clone_from(&light_group);
+                }
+                own
             }));
         }
         let own = named.map_or(&materials[first_own..], |index| &materials[index..=index]);
@@ -329,11 +339,31 @@ impl Loader<'_> {
             self.check_extent(label, placed)?;
             warnings.extend(dropped.warnings(label, of));
         }
+        if object.light_group.is_some() && !emits(object, mesh, materials) {
+            warnings.push(format!("{label}: ignored light_group: the object emits no light"));
+        }
         if of == 0 {
             warnings.push(format!("{label}: the mesh has no triangles"));
         }
         Ok(())
     }
+}
+
+/// Finds a material whose light belongs to a group, as `of` looks, or adds it.
+fn lit_material(of: usize, group: &str, materials: &mut Vec<Material>) -> usize {
+    let mut lit = materials[of].clone();
+    if lit.surface.emission.is_none() {
+        return of;
+    }
+    lit.surface.light_group = Some(group.to_owned());
+    let is_it = |known: &Material| {
+        known.name == lit.name && known.surface.light_group == lit.surface.light_group
+    };
+    let found = materials.iter().position(is_it);
+    found.unwrap_or_else(|| {
+        materials.push(lit);
+        materials.len() - 1
+    })
 }
 
 /// Material of a triangle among those of its mesh file.
