@@ -7,7 +7,7 @@ use fenestra::{
     film::{Aov, Sums, Window},
     pass::{PathLists, Roulette},
     sampler::{Parameters, Sampler},
-    scene::{Filter, Scene},
+    scene::{Filter, Lamp, Scene, lamp::LampKind},
     session::{Event, Flag, Observer, Rules, Session, Settings, StopReason},
 };
 use glam::Vec3;
@@ -20,6 +20,8 @@ fn scene() -> Scene {
         vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)];
     let mut scene = scenes::room(materials);
     scene.film.filter = Filter::Gaussian;
+    let kind = LampKind::Point { position: Vec3::new(0.3, 2.0, 0.4), intensity: Vec3::splat(0.2) };
+    scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: Some("key".into()) });
     scene
 }
 
@@ -30,6 +32,10 @@ fn settings(sampler: Sampler) -> Settings {
         Sampler::Visibility => aovs.push(Aov::CacheEntries),
         Sampler::Guided => aovs.push(Aov::GuideCell),
         _ => {}
+    }
+    // `guided` shares paths here, which do not keep groups of lights apart.
+    if sampler != Sampler::Guided {
+        aovs.push(Aov::LightGroups);
     }
     let candidates = (sampler == Sampler::Guided).then_some(1);
     let parameters = Parameters { candidates, ..Parameters::default() };

@@ -56,6 +56,11 @@ pub enum Aov {
     /// `CryptoMaterial00…02.R/G/B/A`: the same of materials.
     #[value(aliases = ["CryptoMaterial"])]
     CryptoMaterial,
+    /// `Combined_GROUP.R/G/B`: light of each group of lights, which add up to the picture: `environment`,
+    /// `lamps`, and those that `light_group` names in the scene file, eight at most. Leaves `share-paths`
+    /// off.
+    #[value(aliases = ["LightGroups"])]
+    LightGroups,
 }
 
 impl Aov {
@@ -128,6 +133,45 @@ pub type Coverage = [[u32; 2]; MATTE_SLOTS as usize];
 pub(crate) const COVERAGES: [(Aov, &str); 2] =
     [(Aov::CryptoObject, "ObjectCounts"), (Aov::CryptoMaterial, "MaterialCounts")];
 
+/// Sums over the samples of every pixel of the light of one group of lights, as those of [`Sums`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GroupSums {
+    /// Name of the group.
+    pub name: String,
+    /// Leading part of Σ radiance.
+    pub sum: Vec<[f32; 3]>,
+    /// Rest of Σ radiance.
+    pub compensation: Vec<[f32; 3]>,
+    /// Radiance of the sample of a stopped sweep, as [`Sums::pending`].
+    pub pending: Vec<[f32; 3]>,
+}
+
+impl GroupSums {
+    /// Layers of [`GroupSums::parts`] in a checkpoint.
+    pub(crate) const PARTS: [&str; 3] = ["GroupSum", "GroupCompensation", "GroupPending"];
+
+    pub(crate) fn parts(&self) -> [&Vec<[f32; 3]>; 3] {
+        [&self.sum, &self.compensation, &self.pending]
+    }
+
+    /// Channels of the group's layer, or of one of its sums.
+    pub(crate) fn channels(layer: &str, name: &str) -> [String; 3] {
+        ["R", "G", "B"].map(|channel| format!("{layer}_{name}.{channel}"))
+    }
+
+    /// Adds the samples of other sums of the same group.
+    fn add(&mut self, other: &Self) {
+        for pixel in 0..self.sum.len() {
+            let ours = joined(self.sum[pixel], self.compensation[pixel]);
+            let theirs = joined(other.sum[pixel], other.compensation[pixel]);
+            for channel in 0..3 {
+                (self.sum[pixel][channel], self.compensation[pixel][channel]) =
+                    split(ours[channel] + theirs[channel]);
+            }
+        }
+    }
+}
+
 /// A sweep over the film that was stopped on its way: the first blocks have one more sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ahead {
@@ -195,6 +239,9 @@ pub struct Sums {
     pub objects: Vec<Coverage>,
     /// Samples by material; empty if not asked for.
     pub materials: Vec<Coverage>,
+    /// Groups of lights in the order of [`LightGroups`](crate::scene::light_group::LightGroups); empty if not
+    /// asked for.
+    pub groups: Vec<GroupSums>,
 }
 
 /// Defines a method that returns all layers of a table, and one to change them.
@@ -237,7 +284,14 @@ impl Sums {
     pub(crate) fn lacks(&self, asked: &Self) -> BTreeSet<Aov> {
         let both = self.extra_layers().into_iter().zip(asked.extra_layers());
         let lacking = both.filter(|((_, is_ours), (_, is_asked))| *is_asked && !is_ours);
-        lacking.map(|((aov, _), _)| aov).collect()
+        let lacks_group = asked.groups.iter().any(|group| self.group(&group.name).is_none());
+        let groups = lacks_group.then_some(Aov::LightGroups);
+        lacking.map(|((aov, _), _)| aov).chain(groups).collect()
+    }
+
+    /// Finds the sums of a group of lights.
+    pub fn group(&self, name: &str) -> Option<&GroupSums> {
+        self.groups.iter().find(|group| group.name == name)
     }
 
     /// Layers that not every film has, and true for those that are there.
@@ -288,18 +342,28 @@ impl Sums {
         for pixel in 0..self.pixel_count() {
             if !self.is_ahead(self.place(pixel)) {
                 self.pending[pixel] = [0.0; 3];
+                self.groups.iter_mut().for_each(|group| group.pending[pixel] = [0.0; 3]);
             }
         }
     }
 
     /// Mean radiance of one pixel; 0 before the first sample.
     pub fn mean(&self, pixel: usize) -> [f64; 3] {
-        let total = self.total(pixel);
+        self.mean_of(self.total(pixel), &self.pending, pixel)
+    }
+
+    /// Mean radiance of one pixel in the layer of a group of lights.
+    pub fn group_mean(&self, group: &GroupSums, pixel: usize) -> [f64; 3] {
+        let total = joined(group.sum[pixel], group.compensation[pixel]);
+        self.mean_of(total, &group.pending, pixel)
+    }
+
+    fn mean_of(&self, total: [f64; 3], pending: &[[f32; 3]], pixel: usize) -> [f64; 3] {
         if self.ahead.is_none() {
             let count = f64::from(self.sample_count.max(1));
             return total.map(|total| total / count);
         }
-        let (pending, weight) = self.pending_at(pixel);
+        let (pending, weight) = self.pending_at(pixel, pending);
         let weight = f64::from(self.sample_count) + weight;
         let weight = if weight > 0.0 { weight } else { 1.0 };
         array::from_fn(|channel| (total[channel] + pending[channel]) / weight)
@@ -307,7 +371,7 @@ impl Sums {
 
     /// The filtered sample of a stopped sweep at a pixel: Σ weight · radiance over the pixels that have
     /// one, and the sum of these weights, up to 1.
-    fn pending_at(&self, pixel: usize) -> ([f64; 3], f64) {
+    fn pending_at(&self, pixel: usize, pending: &[[f32; 3]]) -> ([f64; 3], f64) {
         let place = self.place(pixel);
         let ends = [self.width, self.height];
         let weights: [[f64; 3]; 2] = array::from_fn(|axis| match self.ahead.offset {
@@ -327,7 +391,7 @@ impl Sums {
                     continue;
                 };
                 if weight > 0.0 && self.is_ahead([column, row]) {
-                    let radiance = self.pending[(row * self.width + column) as usize];
+                    let radiance = pending[(row * self.width + column) as usize];
                     sum += weight;
                     for channel in 0..3 {
                         value[channel] += weight * f64::from(radiance[channel]);
@@ -388,7 +452,10 @@ impl Sums {
     /// Counts pixels with a non-finite sum in any layer. Passes drop such samples, so anything but 0
     /// is a defect.
     pub fn non_finite_count(&self) -> usize {
-        let layers: Vec<_> = self.triples().into_iter().chain([&self.pending]).collect();
+        let groups = self.groups.iter();
+        let groups = groups.flat_map(GroupSums::parts);
+        let layers: Vec<_> =
+            self.triples().into_iter().chain([&self.pending]).chain(groups).collect();
         let is_bad = |value: &[f32; 3]| value.iter().any(|component| !component.is_finite());
         let has_bad =
             |pixel: &usize| layers.iter().any(|sums| sums.get(*pixel).is_some_and(is_bad));
@@ -447,6 +514,14 @@ impl Sums {
                     insert_means(&mut image, names, &self.guide_cell);
                     let names = ["GuideLevel.R", "GuideLevel.G", "GuideLevel.B"];
                     insert_means(&mut image, names, &self.guide_level);
+                }
+                Aov::LightGroups => {
+                    for group in &self.groups {
+                        let mean = |pixel: usize| narrow(self.group_mean(group, pixel));
+                        let names = GroupSums::channels("Combined", &group.name);
+                        let names = names.each_ref().map(String::as_str);
+                        image.insert_triple(names, &pixels().map(mean).collect::<Vec<_>>());
+                    }
                 }
                 Aov::CryptoObject | Aov::CryptoMaterial => {
                     let [objects, materials] = self.coverages();
@@ -517,6 +592,10 @@ impl Sums {
             for (own, more) in ours.iter_mut().zip(theirs) {
                 add_coverage(own, more);
             }
+        }
+        self.groups.retain(|group| other.group(&group.name).is_some());
+        for group in &mut self.groups {
+            other.group(&group.name).into_iter().for_each(|more| group.add(more));
         }
         self.sample_count = self.sample_count.saturating_add(other.sample_count);
     }

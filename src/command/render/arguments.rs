@@ -394,8 +394,9 @@ impl Arguments {
             }
         }
         let mut parameters = Parameters::default();
-        if denoises {
-            // Noise that the pixels of a cohort have in common looks like a pattern to the denoiser.
+        if denoises || self.aov.contains(&Aov::LightGroups) {
+            // Noise that the pixels of a cohort have in common looks like a pattern to the denoiser. Shared
+            // paths do not keep groups of lights apart.
             parameters.set("share-paths=off")?;
         }
         for assignment in &self.set {
