@@ -25,8 +25,8 @@ void add(vec3 value, inout vec3 sum, inout vec3 compensation) {
     compensation = next_compensation;
 }
 
-// Returns one sample of the filtered picture, or of a layer of it: those of 3×3 pixels by their weights, which
-// add up to one. Layer 0 is the picture; those of light groups follow.
+// Returns one sample of the filtered picture, layer 0, or of a light group: those of 3×3 pixels by their
+// weights, which add up to one.
 vec3 filtered(PathIndex index, uint place, uint i, uint layer) {
     if (parameters.film_filter != FILTER_GAUSSIAN) {
         return film_radiance[radiance_place(place, i) + layer];

@@ -138,9 +138,9 @@ struct Page {
 }
 
 impl FilmBuffers {
-    /// Makes an empty film of the window, with the extra layers in the bits `aovs` and of groups of lights, in
-    /// buffers of at most `page_bytes` bytes and what the device allows, but of a row of blocks at least, for sweeps of up
-    /// to `sweep_samples` samples.
+    /// Makes an empty film of the window, with the extra layers in the bits `aovs` and of groups of lights,
+    /// in buffers of at most `page_bytes` bytes and what the device allows, but of a row of blocks at least,
+    /// for sweeps of up to `sweep_samples` samples.
     pub(crate) fn new(
         device: &Arc<Device>,
         window: Window,
@@ -332,8 +332,8 @@ impl FilmBuffers {
         }
     }
 
-    /// Reads the radiance of a sweep of one sample to what is pending of `sums`; what the sweep has not reached
-    /// means nothing.
+    /// Reads the radiance of a sweep of one sample to what is pending of `sums`; what the sweep has not
+    /// reached means nothing.
     pub(crate) fn download_radiance(&self, sums: &mut Sums) -> Result<()> {
         let layers = 1 + self.light_groups.len();
         for page in &self.pages {

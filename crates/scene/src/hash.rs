@@ -15,8 +15,8 @@ use crate::{
 
 /// Hashes camera, film, environment, materials and geometry; lower-case hexadecimal.
 ///
-/// Names, but for those of groups of lights, paths and the order of the text do not enter. A length precedes every array and a tag
-/// every variant, so that no two scenes give the same bytes.
+/// Names, but for those of groups of lights, paths and the order of the text do not enter. A length precedes
+/// every array and a tag every variant, so that no two scenes give the same bytes.
 pub(crate) fn hash(scene: &Scene) -> String {
     let mut hasher = Hasher(Sha256::new());
     let camera = &scene.camera;

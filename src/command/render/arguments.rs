@@ -328,6 +328,14 @@ impl Arguments {
         (!taken.is_empty()).then(|| format!("{} asks for {list}", scene.path.display()))
     }
 
+    /// Says that a sampler which shares paths does not, for the groups of lights.
+    pub(super) fn unshared(&self, settings: &Settings) -> Option<String> {
+        let shares = self.sampler.cohort_edge(&Parameters::default()) > 1 && settings.depth > 1;
+        (shares && self.aov.contains(&Aov::LightGroups)).then(|| {
+            format!("--aov light-groups: {} shares no paths (share-paths=off)", self.sampler.name())
+        })
+    }
+
     /// Samples that the scene's file asks for, where no option says when to stop.
     pub(super) fn asked_samples(&self, asked: Asked) -> Option<u32> {
         asked.samples.filter(|_| self.quality.is_none() && self.quality().is_some())

@@ -47,7 +47,7 @@ struct ObjectKeys {
     /// Translation, metres, applied last.
     #[serde(default)]
     translate: [f32; 3],
-    /// Group of the light that it emits, as that of a lamp.
+    /// Group of the light that it emits. Default: lamps.
     light_group: Option<String>,
 }
 
@@ -59,7 +59,7 @@ struct LampKeys {
     name: Option<String>,
     /// Kind.
     r#type: Spanned<String>,
-    /// Group of the light in the layers of `--aov LightGroups`. Default: lamps.
+    /// Group of its light, for `--aov LightGroups`. Default: lamps.
     light_group: Option<String>,
 }
 
