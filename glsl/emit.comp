@@ -38,7 +38,7 @@ void add_emission(uint path) {
         weight = ray.brdf_pdf / (ray.brdf_pdf + lamp_pdf(density, hit.distance, cosine));
     }
     PathState state = paths[path];
-    vec3 light = state.throughput * radiance * weight;
+    precise vec3 light = state.throughput * radiance * weight;
     paths[path].radiance = state.radiance + light;
     add_to_group(path, surface.light_group, light);
 }

@@ -30,7 +30,7 @@ void gather_path(uint path) {
                     / (float(rays) * mis_pdf(ray.brdf_pdf, environment_density, rays, 1u));
             }
             PathState state = paths[path];
-            vec3 found = state.throughput * light.xyz * weight;
+            precise vec3 found = state.throughput * light.xyz * weight;
             paths[path].radiance = state.radiance + found;
             add_to_group(path, ENVIRONMENT_GROUP, found);
         }
@@ -51,7 +51,7 @@ void gather_path(uint path) {
         }
     }
     PathState state = paths[path];
-    vec3 found = state.throughput * (sum / float(max(wave.total_shadow_rays, 1u)));
+    precise vec3 found = state.throughput * (sum / float(max(wave.total_shadow_rays, 1u)));
     state.radiance += found;
     state.shadow_rays_traced += traced;
     state.shadow_rays_visible += visible;

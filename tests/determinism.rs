@@ -290,6 +290,9 @@ fn a_crop_window_shows_the_same_pixels() {
                 assert_eq!(crop.sum[inner], whole.sum[outer], "{name}: pixel {x},{y}");
                 assert_eq!(crop.unfiltered[inner], whole.unfiltered[outer], "{name}");
                 assert_eq!(crop.normal[inner], whole.normal[outer], "{name}: pixel {x},{y}");
+                for (ours, theirs) in crop.groups.iter().zip(&whole.groups) {
+                    assert_eq!(ours.sum[inner], theirs.sum[outer], "{name}: pixel {x},{y}");
+                }
             }
         }
     }
@@ -304,7 +307,11 @@ fn sample_ranges_add_up() {
         let rest = render(Settings { first_sample: 1, ..settings(sampler) }, &[3]);
         first.add(&rest);
         for pixel in 0..whole.pixel_count() {
-            for (a, b) in first.total(pixel).into_iter().zip(whole.total(pixel)) {
+            let means = |sums: &Sums| {
+                let groups = sums.groups.iter().flat_map(|group| sums.group_mean(group, pixel));
+                sums.total(pixel).into_iter().chain(groups).collect::<Vec<_>>()
+            };
+            for (a, b) in means(&first).into_iter().zip(means(&whole)) {
                 let name = sampler.name();
                 assert!((a - b).abs() <= 1e-12 * b.abs(), "{name}, pixel {pixel}: {a} against {b}");
             }

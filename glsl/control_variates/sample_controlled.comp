@@ -46,7 +46,7 @@ void sample_vertex(uint path, Vertex vertex) {
         rest += controlled_rest(chosen, CANDIDATES, contribution);
     }
     PathState state = paths[path];
-    vec3 light = state.throughput * (rest / float(wave.total_shadow_rays));
+    precise vec3 light = state.throughput * (rest / float(wave.total_shadow_rays));
     paths[path].radiance = state.radiance + light;
     add_to_group(path, ENVIRONMENT_GROUP, light);
 }

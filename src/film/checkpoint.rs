@@ -24,9 +24,9 @@ use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::{
-    Attribute, Image,
+    Attribute, GroupSums, Image,
     metadata::Metadata,
-    sums::{COUNTS, COVERAGES, Coverage, GroupSums, Sums, TRIPLES, split},
+    sums::{COUNTS, COVERAGES, Coverage, Sums, TRIPLES, split},
 };
 use crate::{
     error::{Error, Result},

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::{
     Image,
     cryptomatte::{self, MATERIALS, OBJECTS},
+    group_sums::GroupSums,
     reconstruction::weights,
 };
 use crate::shader::constants::{FILM_BLOCK, MATTE_SLOTS};
@@ -132,45 +133,6 @@ pub type Coverage = [[u32; 2]; MATTE_SLOTS as usize];
 /// Layers of coverages, with the channels of each slot.
 pub(crate) const COVERAGES: [(Aov, &str); 2] =
     [(Aov::CryptoObject, "ObjectCounts"), (Aov::CryptoMaterial, "MaterialCounts")];
-
-/// Sums over the samples of every pixel of the light of one group of lights, as those of [`Sums`].
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct GroupSums {
-    /// Name of the group.
-    pub name: String,
-    /// Leading part of Σ radiance.
-    pub sum: Vec<[f32; 3]>,
-    /// Rest of Σ radiance.
-    pub compensation: Vec<[f32; 3]>,
-    /// Radiance of the sample of a stopped sweep, as [`Sums::pending`].
-    pub pending: Vec<[f32; 3]>,
-}
-
-impl GroupSums {
-    /// Layers of [`GroupSums::parts`] in a checkpoint.
-    pub(crate) const PARTS: [&str; 3] = ["GroupSum", "GroupCompensation", "GroupPending"];
-
-    pub(crate) fn parts(&self) -> [&Vec<[f32; 3]>; 3] {
-        [&self.sum, &self.compensation, &self.pending]
-    }
-
-    /// Channels of the group's layer, or of one of its sums.
-    pub(crate) fn channels(layer: &str, name: &str) -> [String; 3] {
-        ["R", "G", "B"].map(|channel| format!("{layer}_{name}.{channel}"))
-    }
-
-    /// Adds the samples of other sums of the same group.
-    fn add(&mut self, other: &Self) {
-        for pixel in 0..self.sum.len() {
-            let ours = joined(self.sum[pixel], self.compensation[pixel]);
-            let theirs = joined(other.sum[pixel], other.compensation[pixel]);
-            for channel in 0..3 {
-                (self.sum[pixel][channel], self.compensation[pixel][channel]) =
-                    split(ours[channel] + theirs[channel]);
-            }
-        }
-    }
-}
 
 /// A sweep over the film that was stopped on its way: the first blocks have one more sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -452,8 +414,7 @@ impl Sums {
     /// Counts pixels with a non-finite sum in any layer. Passes drop such samples, so anything but 0
     /// is a defect.
     pub fn non_finite_count(&self) -> usize {
-        let groups = self.groups.iter();
-        let groups = groups.flat_map(GroupSums::parts);
+        let groups = self.groups.iter().flat_map(GroupSums::parts);
         let layers: Vec<_> =
             self.triples().into_iter().chain([&self.pending]).chain(groups).collect();
         let is_bad = |value: &[f32; 3]| value.iter().any(|component| !component.is_finite());
@@ -556,18 +517,11 @@ impl Sums {
             (other.origin, other.width, other.height, other.film_size),
             "sums of one window are added"
         );
-        for pixel in 0..self.pixel_count() {
-            let (ours, theirs) = (self.total(pixel), other.total(pixel));
-            let squares = (self.total_squares(pixel), other.total_squares(pixel));
-            for channel in 0..3 {
-                let (sum, rest) = split(ours[channel] + theirs[channel]);
-                self.sum[pixel][channel] = sum;
-                self.compensation[pixel][channel] = rest;
-                let (sum, rest) = split(squares.0[channel] + squares.1[channel]);
-                self.squares[pixel][channel] = sum;
-                self.squares_compensation[pixel][channel] = rest;
-            }
-        }
+        add_joined([&mut self.sum, &mut self.compensation], [&other.sum, &other.compensation]);
+        add_joined(
+            [&mut self.squares, &mut self.squares_compensation],
+            [&other.squares, &other.squares_compensation],
+        );
         // The parts of radiance and of its squares are added.
         for (ours, theirs) in self.triples_mut().into_iter().zip(other.triples()).skip(4) {
             if theirs.is_empty() {
@@ -595,7 +549,10 @@ impl Sums {
         }
         self.groups.retain(|group| other.group(&group.name).is_some());
         for group in &mut self.groups {
-            other.group(&group.name).into_iter().for_each(|more| group.add(more));
+            if let Some(more) = other.group(&group.name) {
+                let ours = [&mut group.sum, &mut group.compensation];
+                add_joined(ours.map(Vec::as_mut_slice), [&more.sum, &more.compensation]);
+            }
         }
         self.sample_count = self.sample_count.saturating_add(other.sample_count);
     }
@@ -624,6 +581,16 @@ fn insert_ratio(image: &mut Image, [ratio, whole]: [&str; 2], counts: &[[u32; 2]
 /// The value of a two-float sum.
 fn joined(leading: [f32; 3], rest: [f32; 3]) -> [f64; 3] {
     array::from_fn(|channel| f64::from(leading[channel]) + f64::from(rest[channel]))
+}
+
+/// Adds other two-float sums to those of every pixel.
+fn add_joined([leading, rest]: [&mut [[f32; 3]]; 2], other: [&[[f32; 3]]; 2]) {
+    for (pixel, (leading, rest)) in leading.iter_mut().zip(rest).enumerate() {
+        let (ours, theirs) = (joined(*leading, *rest), joined(other[0][pixel], other[1][pixel]));
+        for channel in 0..3 {
+            (leading[channel], rest[channel]) = split(ours[channel] + theirs[channel]);
+        }
+    }
 }
 
 /// Splits `value` into the two floats whose sum is nearest to it: its rounding and the rest.

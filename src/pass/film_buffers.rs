@@ -7,8 +7,8 @@ use bytemuck::{Pod, Zeroable};
 use crate::{
     error::{Error, Result},
     film::{
-        Aov, Sums, Window,
-        sums::{COUNTS, COVERAGES, Coverage, GroupSums, TRIPLES},
+        Aov, GroupSums, Sums, Window,
+        sums::{COUNTS, COVERAGES, Coverage, TRIPLES},
     },
     gpu::{Buffer, Commands, DescriptorSet, Device},
     memory,
@@ -415,7 +415,7 @@ impl FilmBuffers {
                 (all[at], all[at + 1]) = (*parts.0, *parts.1);
             }
         }
-        for page in self.pages.iter().filter(|_| values > 0) {
+        for page in self.pages.iter().filter(|page| values > 0 && self.pixels_of(page) > 0) {
             let own = page.first * values..(page.first + self.pixels_of(page)) * values;
             page.groups.upload(bytemuck::cast_slice(&all[own]))?;
         }
