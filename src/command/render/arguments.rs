@@ -330,8 +330,10 @@ impl Arguments {
 
     /// Says that a sampler which shares paths does not, for the groups of lights.
     pub(super) fn unshared(&self, settings: &Settings) -> Option<String> {
-        let shares = self.sampler.cohort_edge(&Parameters::default()) > 1 && settings.depth > 1;
-        (shares && self.aov.contains(&Aov::LightGroups)).then(|| {
+        let edges =
+            [Parameters::default(), settings.parameters].map(|own| self.sampler.cohort_edge(&own));
+        let is_off = edges[0] > 1 && edges[1] == 1 && settings.depth > 1;
+        (is_off && self.aov.contains(&Aov::LightGroups)).then(|| {
             format!("--aov light-groups: {} shares no paths (share-paths=off)", self.sampler.name())
         })
     }
