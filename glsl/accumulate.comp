@@ -10,6 +10,7 @@ UPDATES(film_sum)
 UPDATES(film_compensation)
 UPDATES(film_squares)
 UPDATES(film_squares_compensation)
+UPDATES(film_groups)
 
 // Adds a value to a sum of two floats. Two-sum (Knuth): `rest` is exactly what rounding `total` lost.
 void add(vec3 value, inout vec3 sum, inout vec3 compensation) {
@@ -24,10 +25,11 @@ void add(vec3 value, inout vec3 sum, inout vec3 compensation) {
     compensation = next_compensation;
 }
 
-// Returns one sample of the filtered picture: those of 3×3 pixels by their weights, which add up to one.
-vec3 filtered(PathIndex index, uint place, uint i) {
+// Returns one sample of the filtered picture, layer 0, or of a light group: those of 3×3 pixels by their
+// weights, which add up to one.
+vec3 filtered(PathIndex index, uint place, uint i, uint layer) {
     if (parameters.film_filter != FILTER_GAUSSIAN) {
-        return film_radiance[radiance_place(place, i)];
+        return film_radiance[radiance_place(place, i) + layer];
     }
     uvec2 last = uvec2(parameters.crop_width, parameters.crop_height) - 1u;
     vec2 before = vec2(greaterThan(index.crop_pixel, uvec2(0u)));
@@ -41,7 +43,7 @@ vec3 filtered(PathIndex index, uint place, uint i) {
             float weight = rows[y] * columns[x];
             if (weight > 0.0) {
                 uint beside = place + y * parameters.crop_width + x - parameters.crop_width - 1u;
-                value += weight * film_radiance[radiance_place(beside, i)];
+                value += weight * film_radiance[radiance_place(beside, i) + layer];
             }
         }
     }
@@ -55,7 +57,7 @@ void accumulate_pixel(uint pixel, PathIndex index) {
     vec3 squares = film_squares[place];
     vec3 squares_compensation = film_squares_compensation[place];
     for (uint i = 0u; i < wave.sample_count; ++i) {
-        vec3 radiance = filtered(index, place, i);
+        vec3 radiance = filtered(index, place, i, 0u);
         add(radiance, sum, compensation);
         add(radiance * radiance, squares, squares_compensation);
     }
@@ -63,6 +65,16 @@ void accumulate_pixel(uint pixel, PathIndex index) {
     film_compensation[place] = compensation;
     film_squares[place] = squares;
     film_squares_compensation[place] = squares_compensation;
+    for (uint group = 0u; group < LIGHT_GROUPS; ++group) {
+        uint at = 2u * (place * LIGHT_GROUPS + group);
+        sum = film_groups[at];
+        compensation = film_groups[at + 1u];
+        for (uint i = 0u; i < wave.sample_count; ++i) {
+            add(filtered(index, place, i, 1u + group), sum, compensation);
+        }
+        film_groups[at] = sum;
+        film_groups[at + 1u] = compensation;
+    }
 }
 
 RUN_PIXELS(accumulate_pixel)

@@ -2,6 +2,7 @@
 #version 460
 
 #include "frame.glsl"
+#include "light_groups.glsl"
 #include "random.glsl"
 #include "wave.glsl"
 #include "reconstruction.glsl"
@@ -39,4 +40,7 @@ void main() {
 
     rays[path] = Ray(origin, index.inside ? 1u : 0u, normalize(direction), 0.0);
     paths[path] = PathState(vec3(1.0), vec3(0.0), 0u, 0u, index.inside ? 1u : 0u);
+    for (uint group = 0u; group < LIGHT_GROUPS; ++group) {
+        group_radiance[group_place(path, group)] = vec3(0.0);
+    }
 }

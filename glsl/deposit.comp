@@ -1,6 +1,7 @@
 // Leaves the radiance of finished paths for the pass `accumulate`, and adds what needs no filter to the film.
 #version 460
 
+#include "light_groups.glsl"
 #include "wave.glsl"
 
 READS(paths)
@@ -54,12 +55,17 @@ void deposit_pixel(uint pixel, PathIndex index) {
         shadow_rays += uvec2(state.shadow_rays_visible, state.shadow_rays_traced);
         vec3 radiance = state.radiance;
         // One value that is not finite would spoil the pixel for good.
-        if (any(isnan(radiance)) || any(isinf(radiance))) {
+        bool is_dropped = any(isnan(radiance)) || any(isinf(radiance));
+        if (is_dropped) {
             dropped += 1u;
             radiance = vec3(0.0);
         }
         if (adds) {
             film_radiance[radiance_place(place, i)] = radiance;
+            for (uint group = 0u; group < LIGHT_GROUPS; ++group) {
+                vec3 own = group_radiance[group_place(i * wave.pixel_count + pixel, group)];
+                film_radiance[radiance_place(place, i) + 1u + group] = is_dropped ? vec3(0.0) : own;
+            }
         }
         // Add sample by sample: the sum must not depend on how samples are grouped into waves.
         unfiltered += radiance;

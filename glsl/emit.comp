@@ -4,6 +4,7 @@
 
 #include "hit_instance.glsl"
 #include "lamps.glsl"
+#include "light_groups.glsl"
 #include "load.glsl"
 #include "path_list.glsl"
 #include "wave.glsl"
@@ -37,7 +38,9 @@ void add_emission(uint path) {
         weight = ray.brdf_pdf / (ray.brdf_pdf + lamp_pdf(density, hit.distance, cosine));
     }
     PathState state = paths[path];
-    paths[path].radiance = state.radiance + state.throughput * radiance * weight;
+    precise vec3 light = state.throughput * radiance * weight;
+    paths[path].radiance = state.radiance + light;
+    add_to_group(path, surface.light_group, light);
 }
 
 WALK_PATHS(add_emission)

@@ -4,12 +4,14 @@
 #version 460
 
 #include "environment.glsl"
+#include "light_groups.glsl"
 #include "load.glsl"
 #include "mis.glsl"
 #include "path_list.glsl"
 #include "wave.glsl"
 
 READS(visibility)
+READS(lamp_groups)
 UPDATES(paths)
 
 void gather_path(uint path) {
@@ -28,7 +30,9 @@ void gather_path(uint path) {
                     / (float(rays) * mis_pdf(ray.brdf_pdf, environment_density, rays, 1u));
             }
             PathState state = paths[path];
-            paths[path].radiance = state.radiance + state.throughput * light.xyz * weight;
+            precise vec3 found = state.throughput * light.xyz * weight;
+            paths[path].radiance = state.radiance + found;
+            add_to_group(path, ENVIRONMENT_GROUP, found);
         }
         return;
     }
@@ -47,10 +51,14 @@ void gather_path(uint path) {
         }
     }
     PathState state = paths[path];
-    state.radiance += state.throughput * (sum / float(max(wave.total_shadow_rays, 1u)));
+    precise vec3 found = state.throughput * (sum / float(max(wave.total_shadow_rays, 1u)));
+    state.radiance += found;
     state.shadow_rays_traced += traced;
     state.shadow_rays_visible += visible;
     paths[path] = state;
+    if (LIGHT_GROUPS > 0u) {
+        add_to_group(path, wave.to_lamps != 0u ? lamp_groups[path] : ENVIRONMENT_GROUP, found);
+    }
 }
 
 WALK_PATHS(gather_path)

@@ -11,6 +11,7 @@
 #include "reservoir.glsl"
 #include "vertex.glsl"
 
+WRITES(lamp_groups)
 WRITES(lamp_lists)
 
 layout(constant_id = CONSTANT_LAMP_CANDIDATES) const uint LAMP_CANDIDATES = 4u;
@@ -36,6 +37,7 @@ void sample_vertex(uint path, Vertex vertex) {
         reservoir_start(random_1d(vertex.index.pixel, number, dimension, wave.seed));
     vec3 chosen_to_lamp = vec3(0.0);
     vec3 chosen_contribution = vec3(0.0);
+    uint chosen_source = 0u;
     for (uint c = 0u; c < LAMP_CANDIDATES; ++c) {
         uint own = dimension + 1u + 2u * c;
         uvec2 bits = random_bits_2d(vertex.index.pixel, number, own, wave.seed);
@@ -56,10 +58,14 @@ void sample_vertex(uint path, Vertex vertex) {
         if (reservoir_takes(reservoir, target, target)) {
             chosen_to_lamp = lamp.to_lamp;
             chosen_contribution = contribution;
+            chosen_source = lamp.source;
         }
     }
     float factor = reservoir_factor(reservoir, LAMP_CANDIDATES);
     write_ray(path, chosen_to_lamp, chosen_contribution * factor);
+    if (LIGHT_GROUPS > 0u) {
+        lamp_groups[path] = light_group(chosen_source);
+    }
 }
 
 WALK_VERTICES(sample_vertex)

@@ -7,7 +7,7 @@ use fenestra::{
     film::{Aov, Sums, Window},
     pass::{PathLists, Roulette},
     sampler::{Parameters, Sampler},
-    scene::{Filter, Scene},
+    scene::{Filter, Lamp, Scene, lamp::LampKind},
     session::{Event, Flag, Observer, Rules, Session, Settings, StopReason},
 };
 use glam::Vec3;
@@ -20,6 +20,8 @@ fn scene() -> Scene {
         vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)];
     let mut scene = scenes::room(materials);
     scene.film.filter = Filter::Gaussian;
+    let kind = LampKind::Point { position: Vec3::new(0.3, 2.0, 0.4), intensity: Vec3::splat(0.2) };
+    scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: Some("key".into()) });
     scene
 }
 
@@ -30,6 +32,10 @@ fn settings(sampler: Sampler) -> Settings {
         Sampler::Visibility => aovs.push(Aov::CacheEntries),
         Sampler::Guided => aovs.push(Aov::GuideCell),
         _ => {}
+    }
+    // `guided` shares paths here, which do not keep groups of lights apart.
+    if sampler != Sampler::Guided {
+        aovs.push(Aov::LightGroups);
     }
     let candidates = (sampler == Sampler::Guided).then_some(1);
     let parameters = Parameters { candidates, ..Parameters::default() };
@@ -284,6 +290,9 @@ fn a_crop_window_shows_the_same_pixels() {
                 assert_eq!(crop.sum[inner], whole.sum[outer], "{name}: pixel {x},{y}");
                 assert_eq!(crop.unfiltered[inner], whole.unfiltered[outer], "{name}");
                 assert_eq!(crop.normal[inner], whole.normal[outer], "{name}: pixel {x},{y}");
+                for (ours, theirs) in crop.groups.iter().zip(&whole.groups) {
+                    assert_eq!(ours.sum[inner], theirs.sum[outer], "{name}: pixel {x},{y}");
+                }
             }
         }
     }
@@ -298,7 +307,11 @@ fn sample_ranges_add_up() {
         let rest = render(Settings { first_sample: 1, ..settings(sampler) }, &[3]);
         first.add(&rest);
         for pixel in 0..whole.pixel_count() {
-            for (a, b) in first.total(pixel).into_iter().zip(whole.total(pixel)) {
+            let means = |sums: &Sums| {
+                let groups = sums.groups.iter().flat_map(|group| sums.group_mean(group, pixel));
+                sums.total(pixel).into_iter().chain(groups).collect::<Vec<_>>()
+            };
+            for (a, b) in means(&first).into_iter().zip(means(&whole)) {
                 let name = sampler.name();
                 assert!((a - b).abs() <= 1e-12 * b.abs(), "{name}, pixel {pixel}: {a} against {b}");
             }

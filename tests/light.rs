@@ -185,7 +185,7 @@ fn lamps_without_a_surface_light_a_plane() {
             // Rays end at the lamp. The ceiling behind it is beside the camera's view.
             scenes::add_box(&mut scene.geometry, position + 0.1 * Vec3::Y, Vec3::splat(0.1), 0);
         }
-        scene.lamps.push(Lamp { name: "lamp".into(), kind });
+        scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
         scene
     };
     // Integrate I cosθ/d² · ρ/π over the part of the plane that the camera sees: its rays, by pixel.
@@ -258,7 +258,7 @@ fn lamps_of_unlike_power_add_up() {
     for irradiance in [Vec3::new(1.0, 0.0, 0.0), Vec3::new(3.0, 0.0, 1.0), Vec3::new(0.0, 9.0, 0.0)]
     {
         let kind = LampKind::Directional { direction: Vec3::NEG_Y, irradiance };
-        scene.lamps.push(Lamp { name: "lamp".into(), kind });
+        scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
     }
     assert_mean(&scene, settings(Sampler::Mis, 1), 128, 4.0 * 0.5 / f64::from(PI));
 }
@@ -466,6 +466,7 @@ fn the_back_of_a_one_sided_surface_is_black() {
     scene.lamps.push(Lamp {
         name: "lamp".into(),
         kind: LampKind::Point { position: Vec3::ZERO, intensity: Vec3::ONE },
+        light_group: None,
     });
     let dark = mean(&scene, settings(Sampler::Mis, 2));
     assert!(dark == 0.0, "{dark}");

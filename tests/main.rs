@@ -44,6 +44,7 @@ mod killed;
 mod lamps;
 mod layers;
 mod light;
+mod light_groups;
 mod lobe_options;
 mod lobe_parameters;
 mod look;

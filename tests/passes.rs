@@ -45,6 +45,7 @@ fn settings(shadow_rays: u32, depth: u32) -> PassSettings {
         shadow_rays,
         depth,
         aovs: AOV_ALBEDO | AOV_CACHE_ENTRIES | AOV_GUIDE_CELL,
+        light_groups: 0,
         roulette: Roulette::default(),
         cohort_edge: 1,
         surfaces: Surfaces::default(),

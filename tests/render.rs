@@ -123,6 +123,32 @@ fn a_render_continued_from_its_checkpoint_has_the_same_bits() {
 }
 
 #[test]
+fn light_groups_of_parts_add_up_to_the_merged_picture() {
+    let folder = folder();
+    let lamp = "[[lamp]]\ntype = \"point\"\nposition = [1, 2, 1]\nintensity = [4, 5, 6]\n\
+                light_group = \"key\"\n";
+    let text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap() + lamp;
+    folder.write("scene.toml", text);
+    let options = ["render", "scene.toml", "--depth", "2", "--spp", "2", "--aov", "LightGroups"];
+    for (name, seed) in [("a.exr", "0"), ("b.exr", "1")] {
+        let line = "--aov light-groups: guided shares no paths (share-paths=off)";
+        folder.run(&[&options[..], &["--seed", seed, "-o", name]].concat()).assert(0, &[line]);
+    }
+    folder.run(&["merge", "a.exr", "b.exr", "-o", "ab.exr"]).assert(0, &[]);
+    let merged = Image::read_exr(&folder.path().join("ab.exr")).unwrap();
+    for channel in ["R", "G", "B"] {
+        let [sky, key] = ["environment", "key"]
+            .map(|group| &merged.channels[&format!("Combined_{group}.{channel}")]);
+        assert!(key.iter().any(|value| *value > 0.0));
+        for (whole, (sky, key)) in merged.channels[channel].iter().zip(sky.iter().zip(key)) {
+            assert!((sky + key - whole).abs() < 1e-5 * (1.0 + whole), "{sky} + {key}: {whole}");
+        }
+    }
+    let shared = [&options[..], &["--set", "share-paths=4"]].concat();
+    folder.run(&shared).assert(2, &["expected --set share-paths=off"]);
+}
+
+#[test]
 fn what_guided_learned_is_kept_with_the_checkpoint_and_in_files() {
     let folder = folder();
     let options = |spp: &'static str| ["--sampler", "guided", "--spp", spp];

@@ -137,7 +137,7 @@ fn before_a_wall_of_bent_normals() {
     for x in [-2.5, 2.5] {
         let kind =
             LampKind::Point { position: Vec3::new(x, 1.0, 0.0), intensity: Vec3::splat(20.0) };
-        scene.lamps.push(Lamp { name: "lamp".into(), kind });
+        scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
     }
     scene.name = "wall".into();
     agrees(&scene, &[(Sampler::Mis, "8")], 64, &base(2));
@@ -189,7 +189,7 @@ fn lit_room(materials: Vec<Material>) -> Scene {
     let mut scene = scenes::room(materials);
     let position = Vec3::new(0.3, 2.1, 0.4);
     let kind = LampKind::Point { position, intensity: Vec3::splat(2.0) };
-    scene.lamps.push(Lamp { name: "lamp".into(), kind });
+    scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
     scene
 }
 
@@ -230,7 +230,7 @@ fn light_from_beyond_a_sheet_stays_with_its_own_path() {
     scenes::add_box(&mut scene.geometry, 8.0 * Vec3::Y, Vec3::new(100.0, 1e-3, 100.0), 1);
     scenes::add_box(&mut scene.geometry, 12.0 * Vec3::Y, Vec3::new(40.0, 1.0, 40.0), 0);
     let kind = LampKind::Point { position: 10.0 * Vec3::Y, intensity: Vec3::splat(50.0) };
-    scene.lamps.push(Lamp { name: "lamp".into(), kind });
+    scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
     let picture = |edge, depth| render(&scene, settings(Sampler::Mis, edge, depth), &[8]).sum;
     let [alone, shared, direct] = [("off", 2), ("8", 2), ("off", 1)].map(|(e, d)| picture(e, d));
     for ((alone, shared), direct) in alone.iter().zip(&shared).zip(&direct) {

@@ -8,6 +8,7 @@
 
 #include "control_variates/controlled.glsl"
 #include "control_variates/records.glsl"
+#include "light_groups.glsl"
 #include "path_list.glsl"
 #include "vertex.glsl"
 
@@ -45,8 +46,9 @@ void sample_vertex(uint path, Vertex vertex) {
         rest += controlled_rest(chosen, CANDIDATES, contribution);
     }
     PathState state = paths[path];
-    paths[path].radiance =
-        state.radiance + state.throughput * (rest / float(wave.total_shadow_rays));
+    precise vec3 light = state.throughput * (rest / float(wave.total_shadow_rays));
+    paths[path].radiance = state.radiance + light;
+    add_to_group(path, ENVIRONMENT_GROUP, light);
 }
 
 WALK_VERTICES(sample_vertex)

@@ -24,6 +24,8 @@ struct LampSample {
     float pdf;
     // Factor on the weight of a candidate.
     float visibility;
+    // As in LampChoice.
+    uint source;
 };
 
 // Density per steradian of sampling a point at `distance` on a triangle of area `area`, which
@@ -45,7 +47,7 @@ float spot_falloff(Lamp lamp, float cosine) {
 LampSample sample_point_lamp(Lamp lamp, vec3 position) {
     if (lamp.kind == LAMP_DIRECTIONAL) {
         // Beyond any scene, and short enough to have a square.
-        return LampSample(-1.0e18 * lamp.direction, -lamp.direction, lamp.intensity, 0.0, 1.0);
+        return LampSample(-1.0e18 * lamp.direction, -lamp.direction, lamp.intensity, 0.0, 1.0, 0u);
     }
     vec3 to_lamp = lamp.position - position;
     float distance = length(to_lamp);
@@ -55,7 +57,7 @@ LampSample sample_point_lamp(Lamp lamp, vec3 position) {
         falloff = spot_falloff(lamp, -dot(direction, lamp.direction));
     }
     vec3 irradiance = lamp.intensity * (falloff / max(distance * distance, 1.0e-20));
-    return LampSample(to_lamp, direction, irradiance, 0.0, 1.0);
+    return LampSample(to_lamp, direction, irradiance, 0.0, 1.0, 0u);
 }
 
 LampSample sample_triangle_lamp(uint triangle, float probability, vec3 position, vec2 u) {
@@ -72,7 +74,7 @@ LampSample sample_triangle_lamp(uint triangle, float probability, vec3 position,
     vec3 normal = cross(b - a, c - a);
     float twice_area = length(normal);
     float cosine = -dot(direction, normal) / max(twice_area, 1.0e-37);
-    LampSample sampled = LampSample(to_lamp, direction, vec3(0.0), 0.0, 1.0);
+    LampSample sampled = LampSample(to_lamp, direction, vec3(0.0), 0.0, 1.0, 0u);
     if (cosine != 0.0 && distance > 0.0) {
         sampled.pdf = lamp_pdf(2.0 * probability / twice_area, distance, abs(cosine));
         sampled.radiance_over_pdf =
@@ -162,5 +164,13 @@ LampSample sample_lamp(uint list, vec3 position, uvec2 bits, vec2 u) {
         sampled = sample_triangle_lamp(drawn.source, drawn.probability, position, u);
     }
     sampled.visibility = drawn.visibility;
+    sampled.source = drawn.source;
     return sampled;
+}
+
+// Group of the light of a lamp or emitting triangle.
+uint light_group(uint source) {
+    return (source & LAMP_BIT) != 0u
+        ? lamps[source & ~LAMP_BIT].light_group
+        : load_material_surface(triangle_materials[source]).light_group;
 }

@@ -40,11 +40,11 @@ MaterialSurface load_material_surface(uint material) {
     uvec4 first = texelFetch(material_surface_texels, int(4u * material));
     uvec4 second = texelFetch(material_surface_texels, int(4u * material + 1u));
     uvec4 third = texelFetch(material_surface_texels, int(4u * material + 2u));
-    uvec2 fourth = texelFetch(material_surface_texels, int(4u * material + 3u)).xy;
+    uvec3 fourth = texelFetch(material_surface_texels, int(4u * material + 3u)).xyz;
     return MaterialSurface(
         first.x, first.y, first.z, first.w, second.x, second.y, uintBitsToFloat(second.z),
         uintBitsToFloat(second.w), uintBitsToFloat(third.x), uintBitsToFloat(third.yzw), fourth.x,
-        uintBitsToFloat(fourth.y), vec2(0.0));
+        uintBitsToFloat(fourth.y), fourth.z, 0.0);
 }
 
 // Defines a function that reads a word of a buffer in up to four pages; with one page the choice folds away.

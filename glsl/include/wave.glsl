@@ -9,6 +9,9 @@ layout(scalar, push_constant) uniform WaveConstants {
     Wave wave;
 };
 
+// Number of groups of lights whose light is kept apart.
+layout(constant_id = CONSTANT_LIGHT_GROUPS) const uint LIGHT_GROUPS = 0u;
+
 // Dimensions of random_2d and random_1d along a path: DIMENSION_FILTER and DIMENSION_LENS for the camera,
 // then DIMENSIONS_PER_VERTEX each from DIMENSION_VERTEX on.
 const uint DIMENSION_LENS = 1u;
@@ -77,10 +80,11 @@ uint film_place(PathIndex index) {
     return index.film_index - wave.film_start;
 }
 
-// Returns where the film keeps the radiance of sample `i` of the wave at a place of the page. A row of the
-// page before comes first, and one of the page after last: places above the first row wrap to it.
+// Returns where the film keeps the radiance of sample `i` of the wave at a place of the page; that of light
+// groups follows. A row of the page before comes first, and one of the page after last: places above the
+// first row wrap to it.
 uint radiance_place(uint place, uint i) {
-    return (place + parameters.crop_width) * wave.sample_count + i;
+    return ((place + parameters.crop_width) * wave.sample_count + i) * (1u + LIGHT_GROUPS);
 }
 
 uint vertex_dimension() {

@@ -4,7 +4,8 @@
 //! `Pending.R/G/B` of a stopped sweep, `UnfilteredSum.R/G/B`,
 //! `SquaresCompensation.R/G/B`, `AlbedoSum.R/G/B`, `NSum.X/Y/Z`, `PSum.X/Y/Z`, `GuideCellSum.R/G/B`,
 //! `GuideLevelSum.R/G/B`, and each count of shadow rays, cache entries and coverages as a pair of floats
-//! that add up to the integer.
+//! that add up to the integer;
+//! `GroupSum_NAME.R/G/B` and so on of each group of lights.
 //! Beside them, the picture `R`, `G`, `B` lets any viewer open the file. An attribute holds the
 //! SHA-256 of window, channels and attributes, so that damage does not pass for radiance.
 //!
@@ -23,13 +24,14 @@ use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::{
-    Attribute, Image,
+    Attribute, GroupSums, Image,
     metadata::Metadata,
     sums::{COUNTS, COVERAGES, Coverage, Sums, TRIPLES, split},
 };
 use crate::{
     error::{Error, Result},
     files::{self, hexadecimal, write_atomically},
+    scene::light_group::ENVIRONMENT,
     shader::constants::{FILM_BLOCK, MATTE_SLOTS},
 };
 
@@ -152,6 +154,14 @@ impl Checkpoint {
                 let counts: Vec<_> = coverages.iter().map(|coverage| coverage[slot]).collect();
                 let names = slot_names(layer, slot);
                 insert_counts(&mut image, names.each_ref().map(String::as_str), &counts);
+            }
+        }
+        for group in &sums.groups {
+            for (part, values) in GroupSums::PARTS.iter().zip(group.parts()) {
+                if !values.is_empty() {
+                    let names = GroupSums::channels(part, &group.name);
+                    image.insert_triple(names.each_ref().map(String::as_str), values);
+                }
             }
         }
         self.metadata.store(&mut image);
@@ -295,6 +305,21 @@ impl Checkpoint {
                 coverages.resize(counts.len(), Coverage::default());
                 coverages.iter_mut().zip(counts).for_each(|(own, count)| own[slot] = count);
             }
+        }
+        let group_of = |channel: &String| {
+            let name = channel.strip_prefix(GroupSums::PARTS[0])?.strip_prefix('_')?;
+            Some(name.strip_suffix(".R")?.to_owned())
+        };
+        let mut names: Vec<String> = image.channels.keys().filter_map(group_of).collect();
+        names.sort_by_key(|name| name != ENVIRONMENT);
+        for name in names {
+            let part = |part: &str| {
+                let names = GroupSums::channels(part, &name);
+                layer(names.each_ref().map(String::as_str), false)
+            };
+            let [sum, compensation, pending] = GroupSums::PARTS.map(part);
+            let pending = if ahead.is_none() { Vec::new() } else { pending? };
+            sums.groups.push(GroupSums { sum: sum?, compensation: compensation?, pending, name });
         }
         if sums.non_finite_count() > 0 {
             return Err(Error::format(

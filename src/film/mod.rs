@@ -8,6 +8,7 @@ pub mod checkpoint;
 pub mod cryptomatte;
 pub mod denoised;
 pub mod display;
+mod group_sums;
 pub mod merge;
 pub mod metadata;
 pub mod picture;
@@ -23,6 +24,7 @@ pub(crate) use self::tone::{Curve, Tone};
 pub use self::{
     checkpoint::Checkpoint,
     display::DisplayServer,
+    group_sums::GroupSums,
     metadata::{Metadata, SampleRange},
     statistics::Statistics,
     sums::{Aov, Sums},

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::{
     Image,
     cryptomatte::{self, MATERIALS, OBJECTS},
+    group_sums::GroupSums,
     reconstruction::weights,
 };
 use crate::shader::constants::{FILM_BLOCK, MATTE_SLOTS};
@@ -56,6 +57,11 @@ pub enum Aov {
     /// `CryptoMaterial00…02.R/G/B/A`: the same of materials.
     #[value(aliases = ["CryptoMaterial"])]
     CryptoMaterial,
+    /// `Combined_GROUP.R/G/B`: light of each group of lights, which add up to the picture: `environment`,
+    /// `lamps`, and those that `light_group` names in the scene file, eight at most. Leaves `share-paths`
+    /// off.
+    #[value(aliases = ["LightGroups"])]
+    LightGroups,
 }
 
 impl Aov {
@@ -195,6 +201,9 @@ pub struct Sums {
     pub objects: Vec<Coverage>,
     /// Samples by material; empty if not asked for.
     pub materials: Vec<Coverage>,
+    /// Groups of lights in the order of [`LightGroups`](crate::scene::light_group::LightGroups); empty if not
+    /// asked for.
+    pub groups: Vec<GroupSums>,
 }
 
 /// Defines a method that returns all layers of a table, and one to change them.
@@ -237,7 +246,14 @@ impl Sums {
     pub(crate) fn lacks(&self, asked: &Self) -> BTreeSet<Aov> {
         let both = self.extra_layers().into_iter().zip(asked.extra_layers());
         let lacking = both.filter(|((_, is_ours), (_, is_asked))| *is_asked && !is_ours);
-        lacking.map(|((aov, _), _)| aov).collect()
+        let lacks_group = asked.groups.iter().any(|group| self.group(&group.name).is_none());
+        let groups = lacks_group.then_some(Aov::LightGroups);
+        lacking.map(|((aov, _), _)| aov).chain(groups).collect()
+    }
+
+    /// Finds the sums of a group of lights.
+    pub fn group(&self, name: &str) -> Option<&GroupSums> {
+        self.groups.iter().find(|group| group.name == name)
     }
 
     /// Layers that not every film has, and true for those that are there.
@@ -288,18 +304,28 @@ impl Sums {
         for pixel in 0..self.pixel_count() {
             if !self.is_ahead(self.place(pixel)) {
                 self.pending[pixel] = [0.0; 3];
+                self.groups.iter_mut().for_each(|group| group.pending[pixel] = [0.0; 3]);
             }
         }
     }
 
     /// Mean radiance of one pixel; 0 before the first sample.
     pub fn mean(&self, pixel: usize) -> [f64; 3] {
-        let total = self.total(pixel);
+        self.mean_of(self.total(pixel), &self.pending, pixel)
+    }
+
+    /// Mean radiance of one pixel in the layer of a group of lights.
+    pub fn group_mean(&self, group: &GroupSums, pixel: usize) -> [f64; 3] {
+        let total = joined(group.sum[pixel], group.compensation[pixel]);
+        self.mean_of(total, &group.pending, pixel)
+    }
+
+    fn mean_of(&self, total: [f64; 3], pending: &[[f32; 3]], pixel: usize) -> [f64; 3] {
         if self.ahead.is_none() {
             let count = f64::from(self.sample_count.max(1));
             return total.map(|total| total / count);
         }
-        let (pending, weight) = self.pending_at(pixel);
+        let (pending, weight) = self.pending_at(pixel, pending);
         let weight = f64::from(self.sample_count) + weight;
         let weight = if weight > 0.0 { weight } else { 1.0 };
         array::from_fn(|channel| (total[channel] + pending[channel]) / weight)
@@ -307,7 +333,7 @@ impl Sums {
 
     /// The filtered sample of a stopped sweep at a pixel: Σ weight · radiance over the pixels that have
     /// one, and the sum of these weights, up to 1.
-    fn pending_at(&self, pixel: usize) -> ([f64; 3], f64) {
+    fn pending_at(&self, pixel: usize, pending: &[[f32; 3]]) -> ([f64; 3], f64) {
         let place = self.place(pixel);
         let ends = [self.width, self.height];
         let weights: [[f64; 3]; 2] = array::from_fn(|axis| match self.ahead.offset {
@@ -327,7 +353,7 @@ impl Sums {
                     continue;
                 };
                 if weight > 0.0 && self.is_ahead([column, row]) {
-                    let radiance = self.pending[(row * self.width + column) as usize];
+                    let radiance = pending[(row * self.width + column) as usize];
                     sum += weight;
                     for channel in 0..3 {
                         value[channel] += weight * f64::from(radiance[channel]);
@@ -388,7 +414,9 @@ impl Sums {
     /// Counts pixels with a non-finite sum in any layer. Passes drop such samples, so anything but 0
     /// is a defect.
     pub fn non_finite_count(&self) -> usize {
-        let layers: Vec<_> = self.triples().into_iter().chain([&self.pending]).collect();
+        let groups = self.groups.iter().flat_map(GroupSums::parts);
+        let layers: Vec<_> =
+            self.triples().into_iter().chain([&self.pending]).chain(groups).collect();
         let is_bad = |value: &[f32; 3]| value.iter().any(|component| !component.is_finite());
         let has_bad =
             |pixel: &usize| layers.iter().any(|sums| sums.get(*pixel).is_some_and(is_bad));
@@ -448,6 +476,14 @@ impl Sums {
                     let names = ["GuideLevel.R", "GuideLevel.G", "GuideLevel.B"];
                     insert_means(&mut image, names, &self.guide_level);
                 }
+                Aov::LightGroups => {
+                    for group in &self.groups {
+                        let mean = |pixel: usize| narrow(self.group_mean(group, pixel));
+                        let names = GroupSums::channels("Combined", &group.name);
+                        let names = names.each_ref().map(String::as_str);
+                        image.insert_triple(names, &pixels().map(mean).collect::<Vec<_>>());
+                    }
+                }
                 Aov::CryptoObject | Aov::CryptoMaterial => {
                     let [objects, materials] = self.coverages();
                     let (name, coverages) = match aov {
@@ -481,18 +517,11 @@ impl Sums {
             (other.origin, other.width, other.height, other.film_size),
             "sums of one window are added"
         );
-        for pixel in 0..self.pixel_count() {
-            let (ours, theirs) = (self.total(pixel), other.total(pixel));
-            let squares = (self.total_squares(pixel), other.total_squares(pixel));
-            for channel in 0..3 {
-                let (sum, rest) = split(ours[channel] + theirs[channel]);
-                self.sum[pixel][channel] = sum;
-                self.compensation[pixel][channel] = rest;
-                let (sum, rest) = split(squares.0[channel] + squares.1[channel]);
-                self.squares[pixel][channel] = sum;
-                self.squares_compensation[pixel][channel] = rest;
-            }
-        }
+        add_joined([&mut self.sum, &mut self.compensation], [&other.sum, &other.compensation]);
+        add_joined(
+            [&mut self.squares, &mut self.squares_compensation],
+            [&other.squares, &other.squares_compensation],
+        );
         // The parts of radiance and of its squares are added.
         for (ours, theirs) in self.triples_mut().into_iter().zip(other.triples()).skip(4) {
             if theirs.is_empty() {
@@ -516,6 +545,13 @@ impl Sums {
             }
             for (own, more) in ours.iter_mut().zip(theirs) {
                 add_coverage(own, more);
+            }
+        }
+        self.groups.retain(|group| other.group(&group.name).is_some());
+        for group in &mut self.groups {
+            if let Some(more) = other.group(&group.name) {
+                let ours = [&mut group.sum, &mut group.compensation];
+                add_joined(ours.map(Vec::as_mut_slice), [&more.sum, &more.compensation]);
             }
         }
         self.sample_count = self.sample_count.saturating_add(other.sample_count);
@@ -545,6 +581,16 @@ fn insert_ratio(image: &mut Image, [ratio, whole]: [&str; 2], counts: &[[u32; 2]
 /// The value of a two-float sum.
 fn joined(leading: [f32; 3], rest: [f32; 3]) -> [f64; 3] {
     array::from_fn(|channel| f64::from(leading[channel]) + f64::from(rest[channel]))
+}
+
+/// Adds other two-float sums to those of every pixel.
+fn add_joined([leading, rest]: [&mut [[f32; 3]]; 2], other: [&[[f32; 3]]; 2]) {
+    for (pixel, (leading, rest)) in leading.iter_mut().zip(rest).enumerate() {
+        let (ours, theirs) = (joined(*leading, *rest), joined(other[0][pixel], other[1][pixel]));
+        for channel in 0..3 {
+            (leading[channel], rest[channel]) = split(ours[channel] + theirs[channel]);
+        }
+    }
 }
 
 /// Splits `value` into the two floats whose sum is nearest to it: its rounding and the rest.

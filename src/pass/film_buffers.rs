@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::{
     error::{Error, Result},
     film::{
-        Aov, Sums, Window,
+        Aov, GroupSums, Sums, Window,
         sums::{COUNTS, COVERAGES, Coverage, TRIPLES},
     },
     gpu::{Buffer, Commands, DescriptorSet, Device},
@@ -24,6 +24,8 @@ use crate::{
 
 /// Rows of other pages that a page keeps the radiance of: one before it and one after.
 const EDGE_ROWS: u64 = 2;
+/// Bytes of a colour.
+const RADIANCE_BYTES: u64 = size_of::<[f32; 3]>() as u64;
 /// Pixels of a block in film order; waves hold whole blocks.
 pub(crate) const BLOCK_PIXELS: u32 = FILM_BLOCK * FILM_BLOCK;
 
@@ -71,17 +73,22 @@ pub(crate) fn aov_bits(aovs: &[Aov]) -> u32 {
         Aov::GuideCell => AOV_GUIDE_CELL,
         Aov::CryptoObject => AOV_OBJECTS,
         Aov::CryptoMaterial => AOV_MATERIALS,
-        Aov::Variance | Aov::SampleCount => 0,
+        Aov::Variance | Aov::SampleCount | Aov::LightGroups => 0,
     };
     aovs.iter().map(bit).fold(0, |bits, bit| bits | bit)
 }
 
-/// Checks that there is memory for a film with the layers in the bits `aovs`, on a software device too,
-/// and for the sums that are read back and the image that is made of them.
+/// Checks that there is memory for a film with the layers in the bits `aovs` and of groups of lights, on a
+/// software device too, and for the sums that are read back and the image that is made of them.
 ///
 /// # Errors
 /// [`Error::Memory`].
-pub(crate) fn check_memory(device: &Device, window: Window, aovs: u32) -> Result<()> {
+pub(crate) fn check_memory(
+    device: &Device,
+    window: Window,
+    aovs: u32,
+    light_groups: u32,
+) -> Result<()> {
     let triples = (aovs & (AOV_UNFILTERED | AOV_ALBEDO | AOV_NORMAL | AOV_POSITION)).count_ones()
         + 2 * (aovs & AOV_GUIDE_CELL).count_ones();
     let coverages = (aovs & (AOV_OBJECTS | AOV_MATERIALS)).count_ones();
@@ -89,8 +96,8 @@ pub(crate) fn check_memory(device: &Device, window: Window, aovs: u32) -> Result
         + coverages * size_of::<Coverage>() as u32 / 8;
     // Four sums and the image, in three channels each, and the radiance of a sweep.
     let copies = if device.capabilities().kind == "software" { 2 } else { 1 };
-    let pixel_bytes =
-        u64::from(copies * (48 + 12 * triples + 8 * pairs) + 12 * (2 + triples + pairs));
+    let pixel_bytes = u64::from(copies * (48 + 12 * triples + 8 * pairs + 24 * light_groups))
+        + u64::from(12 * (2 + triples + pairs + 2 * light_groups));
     let Window { width, height, .. } = window;
     let asker = format_args!("a film of {width}x{height} pixels");
     memory::check(asker, u64::from(width) * u64::from(height) * pixel_bytes).map_err(Error::memory)
@@ -102,6 +109,8 @@ pub(crate) struct FilmBuffers {
     pages: Vec<Page>,
     counters: Buffer,
     aovs: u32,
+    /// Names of the groups of lights that it keeps apart.
+    light_groups: Vec<String>,
     /// Window that there is room for.
     whole: Window,
     /// Window in use; another one lies in the first page.
@@ -122,25 +131,31 @@ struct Page {
     pixels: usize,
     /// One for each of [`LAYERS`].
     layers: Vec<Buffer>,
-    /// Radiance of a sweep, [`EDGE_ROWS`] included.
+    /// Sum and compensation of every group of lights, pixel by pixel.
+    groups: Buffer,
+    /// Radiance of a sweep, of the picture and of its groups of lights, [`EDGE_ROWS`] included.
     radiance: Buffer,
 }
 
 impl FilmBuffers {
-    /// Makes an empty film of the window, with the extra layers in the bits `aovs`, in buffers of at
-    /// most `page_bytes` bytes and what the device allows, but of a row of blocks at least, for sweeps of up
-    /// to `sweep_samples` samples.
+    /// Makes an empty film of the window, with the extra layers in the bits `aovs` and of groups of lights,
+    /// in buffers of at most `page_bytes` bytes and what the device allows, but of a row of blocks at least,
+    /// for sweeps of up to `sweep_samples` samples.
     pub(crate) fn new(
         device: &Arc<Device>,
         window: Window,
         aovs: u32,
+        light_groups: &[String],
         page_bytes: u64,
         sweep_samples: u32,
     ) -> Result<Self> {
         let page_bytes = page_bytes.min(device.capabilities().max_storage_buffer_range);
-        let row_bytes = u64::from(sweep_samples * window.width) * size_of::<[f32; 3]>() as u64;
+        let layers = 1 + light_groups.len() as u64;
+        let row_bytes = u64::from(sweep_samples * window.width) * layers * RADIANCE_BYTES;
+        let group_bytes = 2 * (layers - 1) * RADIANCE_BYTES;
+        let widest_row = row_bytes.max(u64::from(window.width) * group_bytes);
         let blocks_down = window.height.div_ceil(FILM_BLOCK);
-        let rows = (page_bytes / row_bytes).saturating_sub(EDGE_ROWS) / u64::from(FILM_BLOCK);
+        let rows = (page_bytes / widest_row).saturating_sub(EDGE_ROWS) / u64::from(FILM_BLOCK);
         let rows = u32::try_from(rows).unwrap_or(blocks_down).clamp(1, blocks_down);
         let counters = Buffer::from_slice(device, "counters", &[Counters::zeroed()])?;
         let page_positions = rows * window.width.div_ceil(FILM_BLOCK) * BLOCK_PIXELS;
@@ -148,7 +163,7 @@ impl FilmBuffers {
             let last = (first + rows * FILM_BLOCK).min(window.height);
             let radiance = u64::from(last - first) + EDGE_ROWS;
             let pixels = [first, last].map(|row| row * window.width);
-            Page::new(device, &counters, pixels, aovs, radiance * row_bytes)
+            Page::new(device, &counters, pixels, aovs, [group_bytes, radiance * row_bytes])
         };
         Ok(Self {
             pages: (0..window.height)
@@ -157,6 +172,7 @@ impl FilmBuffers {
                 .collect::<Result<_>>()?,
             counters,
             aovs,
+            light_groups: light_groups.to_vec(),
             whole: window,
             window,
             kept: window,
@@ -289,6 +305,7 @@ impl FilmBuffers {
         for (index, layer) in sums.coverages_mut().into_iter().enumerate() {
             self.download_layer(FIRST_COVERAGE + index, layer)?;
         }
+        sums.groups = self.download_groups()?;
         Ok(sums)
     }
 
@@ -296,14 +313,14 @@ impl FilmBuffers {
     pub(crate) fn sweep_samples(&self) -> u32 {
         let page = &self.pages[0];
         let pixels = self.pixels_of(page) as u64 + EDGE_ROWS * u64::from(self.window.width);
-        let samples = page.radiance.size() / (pixels * size_of::<[f32; 3]>() as u64);
+        let samples = page.radiance.size() / (pixels * self.sample_bytes());
         u32::try_from(samples).unwrap_or(u32::MAX).max(1)
     }
 
     /// Copies the radiance of `samples` samples along the edges of pages to the pages beside them.
     pub(crate) fn copy_edges(&self, commands: &mut Commands, samples: u32) {
         let width = u64::from(self.window.width);
-        let row_bytes = width * u64::from(samples) * size_of::<[f32; 3]>() as u64;
+        let row_bytes = width * u64::from(samples) * self.sample_bytes();
         let used = self.pages.iter().filter(|page| self.pixels_of(page) > 0);
         let used: Vec<&Page> = used.collect();
         for pair in used.windows(2) {
@@ -315,24 +332,37 @@ impl FilmBuffers {
         }
     }
 
-    /// Reads the radiance of a sweep of one sample; what the sweep has not reached means nothing.
-    pub(crate) fn download_radiance(&self) -> Result<Vec<[f32; 3]>> {
-        let mut radiance = Vec::new();
+    /// Reads the radiance of a sweep of one sample to what is pending of `sums`; what the sweep has not
+    /// reached means nothing.
+    pub(crate) fn download_radiance(&self, sums: &mut Sums) -> Result<()> {
+        let layers = 1 + self.light_groups.len();
         for page in &self.pages {
             let edge = self.window.width as usize;
             let pixels = self.pixels_of(page);
-            let all: Vec<[f32; 3]> = page.radiance.download(edge + pixels)?;
-            radiance.extend_from_slice(&all[edge..]);
+            let all: Vec<[f32; 3]> = page.radiance.download((edge + pixels) * layers)?;
+            for sample in all.chunks_exact(layers).skip(edge) {
+                sums.pending.push(sample[0]);
+                for (group, own) in sums.groups.iter_mut().zip(&sample[1..]) {
+                    group.pending.push(*own);
+                }
+            }
         }
-        Ok(radiance)
+        Ok(())
     }
 
     /// Replaces the content of the film by sums of the same window.
     pub(crate) fn upload(&self, sums: &Sums) -> Result<()> {
         for page in &self.pages {
             if let Some(pixels) = sums.pending.get(page.first..page.first + page.pixels) {
-                let edge = vec![[0.0; 3]; self.window.width as usize];
-                page.radiance.upload(bytemuck::cast_slice(&[&edge, pixels].concat()))?;
+                let edge = self.window.width as usize * (1 + self.light_groups.len());
+                let mut samples = vec![[0.0; 3]; edge];
+                for (pixel, radiance) in (page.first..).zip(pixels) {
+                    samples.push(*radiance);
+                    let of =
+                        |name: &String| sums.group(name).map_or([0.0; 3], |own| own.pending[pixel]);
+                    samples.extend(self.light_groups.iter().map(of));
+                }
+                page.radiance.upload(bytemuck::cast_slice(&samples))?;
             }
         }
         for (index, layer) in sums.triples().into_iter().enumerate() {
@@ -343,6 +373,51 @@ impl FilmBuffers {
         }
         for (index, layer) in sums.coverages().into_iter().enumerate() {
             self.upload_layer(FIRST_COVERAGE + index, layer)?;
+        }
+        self.upload_groups(sums)
+    }
+
+    /// Bytes of the radiance of a sample.
+    fn sample_bytes(&self) -> u64 {
+        (1 + self.light_groups.len() as u64) * RADIANCE_BYTES
+    }
+
+    /// Reads the sums of the groups of lights.
+    fn download_groups(&self) -> Result<Vec<GroupSums>> {
+        let mut all: Vec<[f32; 3]> = Vec::new();
+        let values = 2 * self.light_groups.len();
+        for page in self.pages.iter().filter(|_| values > 0) {
+            let add = |piece: &[_]| all.extend_from_slice(piece);
+            page.groups.download_pieces(self.pixels_of(page) * values, add)?;
+        }
+        let kept = |part: usize| {
+            self.kept_rows().flatten().map(|pixel| all[pixel * values + part]).collect()
+        };
+        let sums = |(index, name): (usize, &String)| GroupSums {
+            name: name.clone(),
+            sum: kept(2 * index),
+            compensation: kept(2 * index + 1),
+            pending: Vec::new(),
+        };
+        Ok(self.light_groups.iter().enumerate().map(sums).collect())
+    }
+
+    fn upload_groups(&self, sums: &Sums) -> Result<()> {
+        let values = 2 * self.light_groups.len();
+        let pixels = self.window.width as usize * self.window.height as usize;
+        let mut all = vec![[0.0; 3]; pixels * values];
+        for (index, name) in self.light_groups.iter().enumerate() {
+            let Some(group) = sums.group(name) else { continue };
+            for (pixel, parts) in
+                self.kept_rows().flatten().zip(group.sum.iter().zip(&group.compensation))
+            {
+                let at = pixel * values + 2 * index;
+                (all[at], all[at + 1]) = (*parts.0, *parts.1);
+            }
+        }
+        for page in self.pages.iter().filter(|page| values > 0 && self.pixels_of(page) > 0) {
+            let own = page.first * values..(page.first + self.pixels_of(page)) * values;
+            page.groups.upload(bytemuck::cast_slice(&all[own]))?;
         }
         Ok(())
     }
@@ -391,23 +466,25 @@ impl FilmBuffers {
     }
 
     fn buffers(&self) -> impl Iterator<Item = &Buffer> {
-        let radiance = self.pages.iter().map(|page| &page.radiance);
+        let others = self.pages.iter().flat_map(|page| [&page.groups, &page.radiance]);
         let layers = self.pages.iter().flat_map(|page| &page.layers);
-        layers.chain(radiance).chain([&self.counters])
+        layers.chain(others).chain([&self.counters])
     }
 }
 
 impl Page {
-    /// Makes the empty film of the pixels `first` to `end`, `end` excluded.
+    /// Makes the empty film of the pixels `first` to `end`, `end` excluded, with so many bytes for the groups
+    /// of lights of a pixel and for the radiance of a sweep.
     fn new(
         device: &Arc<Device>,
         counters: &Buffer,
         [first, end]: [u32; 2],
         aovs: u32,
-        radiance_bytes: u64,
+        [group_bytes, radiance_bytes]: [u64; 2],
     ) -> Result<Self> {
         let pixels = u64::from(end - first);
         let radiance = Buffer::zeroed(device, "film radiance", radiance_bytes)?;
+        let groups = Buffer::zeroed(device, "film groups", group_bytes * pixels)?;
         let make = |(index, (name, ..)): (usize, &(&str, Binding, u32))| {
             let bytes = match index {
                 _ if index < TRIPLES.len() => 12,
@@ -418,10 +495,15 @@ impl Page {
         };
         let layers = LAYERS.iter().enumerate().map(make).collect::<Result<Vec<_>>>()?;
         let bound = LAYERS.iter().zip(&layers).map(|((_, binding, _), buffer)| (*binding, buffer));
-        let others = [(film::COUNTERS, counters), (film::FILM_RADIANCE, &radiance)];
+        let others = [
+            (film::COUNTERS, counters),
+            (film::FILM_RADIANCE, &radiance),
+            (film::FILM_GROUPS, &groups),
+        ];
         let bound: Vec<_> = bound.chain(others).collect();
         let set = DescriptorSet::new(device, &FILM, &bound)?;
-        Ok(Self { set, first: first as usize, pixels: pixels as usize, layers, radiance })
+        let (first, pixels) = (first as usize, pixels as usize);
+        Ok(Self { set, first, pixels, layers, groups, radiance })
     }
 }
 

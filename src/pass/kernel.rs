@@ -5,7 +5,11 @@ use std::sync::Arc;
 use crate::{
     error::Result,
     gpu::{Commands, DescriptorSet, Device, Pipeline},
-    shader::{constants::WORKGROUP_SIZE, spirv, structs::Wave},
+    shader::{
+        constants::{CONSTANT_LIGHT_GROUPS, WORKGROUP_SIZE},
+        spirv,
+        structs::Wave,
+    },
 };
 
 /// Elements that the invocations of a pass run over.
@@ -51,6 +55,14 @@ impl Kernel {
     /// Makes a kernel with one invocation per element of `domain`.
     pub(crate) fn new(shader: &'static str, domain: Domain, constants: &[(u32, u32)]) -> Self {
         Self { shader, constants: constants.to_vec(), domain, per_invocation: 1, question: None }
+    }
+
+    /// Keeps the light of this many groups of lights apart.
+    pub(super) fn with_light_groups(mut self, groups: u32) -> Self {
+        if groups > 0 {
+            self.constants.push((CONSTANT_LIGHT_GROUPS, groups));
+        }
+        self
     }
 
     /// Number of invocations for a wave; at least one, so that an empty wave makes drivers compile.

@@ -17,8 +17,9 @@ use crate::{
         refinement::Queued,
     },
     scene::{
-        Scene, instance,
+        Lamp, Scene, instance,
         lamp::{LampKind, SpotFalloff},
+        light_group::LightGroups,
     },
     shader::{
         constants::{
@@ -85,7 +86,7 @@ impl LampTables {
     ///
     /// Power weighs the choice: of a triangle π · area · luminance of its mean radiance, for both
     /// sides if both emit. A textured triangle takes the mean of the whole image.
-    pub(crate) fn new(scene: &Scene, accel: &Accel) -> Self {
+    pub(crate) fn new(scene: &Scene, accel: &Accel, groups: &LightGroups) -> Self {
         let per_area: Vec<f32> = scene
             .materials
             .iter()
@@ -124,7 +125,7 @@ impl LampTables {
             let power = power(&lamp.kind, radius);
             sources.push(Source { source: LAMP_BIT | index, power, centre });
         }
-        let lamps = scene.lamps.iter().map(|lamp| convert(&lamp.kind)).collect();
+        let lamps = scene.lamps.iter().map(|lamp| convert(lamp, groups)).collect();
         let all: Vec<u32> = (0..sources.len() as u32).collect();
         let total: f64 = sources.iter().map(|source| source.power).sum();
         let mut tables =
@@ -292,12 +293,14 @@ fn power(kind: &LampKind, radius: f32) -> f64 {
     if power.is_finite() { f64::from(power.max(0.0)) } else { 0.0 }
 }
 
-fn convert(kind: &LampKind) -> structs::Lamp {
-    match *kind {
+fn convert(lamp: &Lamp, groups: &LightGroups) -> structs::Lamp {
+    let light_group = groups.index(lamp.light_group.as_deref());
+    match lamp.kind {
         LampKind::Point { position, intensity } => structs::Lamp {
             kind: LAMP_POINT,
             position: position.into(),
             intensity: intensity.into(),
+            light_group,
             ..structs::Lamp::default()
         },
         LampKind::Spot {
@@ -326,12 +329,14 @@ fn convert(kind: &LampKind) -> structs::Lamp {
                 intensity: intensity.into(),
                 inner,
                 outer,
+                light_group,
             }
         }
         LampKind::Directional { direction, irradiance } => structs::Lamp {
             kind: LAMP_DIRECTIONAL,
             direction: direction.into(),
             intensity: irradiance.into(),
+            light_group,
             ..structs::Lamp::default()
         },
     }

@@ -45,6 +45,8 @@ pub struct PassSettings {
     pub depth: u32,
     /// Bits `AOV_…`.
     pub aovs: u32,
+    /// Groups of lights that the film keeps apart; 0 if nobody asks for them.
+    pub light_groups: u32,
     /// Where paths end by chance.
     pub roulette: Roulette,
     /// Edge of the cohorts whose pixels share second vertices: 2, 4, 8, or 1 for none.
@@ -154,6 +156,7 @@ impl<'a> Order<'a> {
 
     fn add_with(&mut self, kernel: Kernel, wave: Wave) {
         let path_list = path_list(kernel.domain, wave.vertex, self.first_listed);
+        let kernel = kernel.with_light_groups(self.settings.light_groups);
         self.dispatches.push(Dispatch { kernel, wave: Wave { path_list, ..wave } });
     }
 

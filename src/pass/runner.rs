@@ -76,13 +76,14 @@ impl Runner {
             padded_pixels,
             settings.most_paths,
             rays,
-            PathDemand { has_features, ..demand },
+            PathDemand { has_features, light_groups: settings.light_groups, ..demand },
             settings.surfaces,
         )?;
         let film = FilmBuffers::new(
             device,
             window,
             settings.aovs,
+            &scene.light_groups().names()[..settings.light_groups as usize],
             settings.film_page_bytes,
             (waves.capacity() / padded_pixels).max(1),
         )?;
@@ -137,7 +138,7 @@ impl Runner {
         let all = [technique.steps()].into_iter().chain(others.iter().map(Box::as_ref));
         for steps in all {
             let mut order = wave_order(&self.settings, steps, Wave::default(), self.settings.depth);
-            order.push(Dispatch { kernel: accumulation(), wave: Wave::default() });
+            order.push(Dispatch { kernel: self.accumulation(), wave: Wave::default() });
             for Dispatch { kernel, wave } in order {
                 let mut add_ms = |name: &str, start: Instant| {
                     let ms = start.elapsed().as_secs_f64() * 1e3;
@@ -207,7 +208,7 @@ impl Runner {
         technique: &dyn Passes,
         wave: Wave,
     ) -> Result<()> {
-        let pass = &self.passes[&accumulation()];
+        let pass = &self.passes[&self.accumulation()];
         self.film.copy_edges(recording.commands(), wave.sample_count);
         let mut first_pixel = 0;
         while first_pixel < self.film.padded_pixels() {
@@ -220,6 +221,11 @@ impl Runner {
             first_pixel += pixel_count;
         }
         Ok(())
+    }
+
+    /// The pass that adds the samples of a sweep to the film.
+    fn accumulation(&self) -> Kernel {
+        Kernel::new("accumulate", Domain::Pixels, &[]).with_light_groups(self.settings.light_groups)
     }
 
     /// Most that one path adds to a counter: energy counts up to 256 at a vertex.
@@ -254,7 +260,7 @@ impl Runner {
         let answers = || self.waves.answers(self.scene.parameters());
         let host = tracer.map(|tracer| (tracer, answers()));
         let pages = if accumulates { self.film.pages().count() } else { 0 };
-        if let Entry::Vacant(vacant) = self.passes.entry(accumulation()) {
+        if let Entry::Vacant(vacant) = self.passes.entry(self.accumulation()) {
             let pass = Pass::new(&self.device, vacant.key().clone())?;
             vacant.insert(pass);
         }
@@ -392,11 +398,6 @@ impl Runner {
         bytes.extend(self.film.buffer_bytes());
         bytes
     }
-}
-
-/// The pass that adds the samples of a sweep to the film.
-fn accumulation() -> Kernel {
-    Kernel::new("accumulate", Domain::Pixels, &[])
 }
 
 fn sets<'a>(

@@ -19,7 +19,10 @@ use crate::{
     error::{Error, Result},
     film::Window,
     gpu::{Buffer, DescriptorSet, Device},
-    scene::{Camera, EnvironmentMap, Filter, Scene, environment::EnvironmentTables},
+    scene::{
+        Camera, EnvironmentMap, Filter, Scene, environment::EnvironmentTables,
+        light_group::LightGroups,
+    },
     shader::{
         bindings::{Binding, SCENE, scene as bindings},
         constants::{FILTER_BOX, FILTER_GAUSSIAN, SURFACES_INSTANCED, SURFACES_LAMP_CELLS},
@@ -38,6 +41,7 @@ pub struct SceneBuffers {
     parameters: SceneParameters,
     surfaces: Surfaces,
     window: Window,
+    light_groups: LightGroups,
     host_ms: BTreeMap<String, f64>,
 }
 
@@ -76,7 +80,7 @@ impl SceneBuffers {
         parts: Parts,
         start: Instant,
     ) -> Result<Self> {
-        let Parts { geometry, textures, lamps, lamp_cells, tables, mattes } = parts;
+        let Parts { geometry, textures, lamps, lamp_cells, light_groups, tables, mattes } = parts;
         let mut host_ms = BTreeMap::new();
         let mut buffers = Vec::new();
         let mut places = Vec::new();
@@ -168,7 +172,17 @@ impl SceneBuffers {
         let set = DescriptorSet::new(device, &SCENE, &bound)?;
         buffers.extend([materials, brdf_table]);
         host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
-        Ok(Self { set, geometry, textures, buffers, parameters, surfaces, window, host_ms })
+        Ok(Self {
+            set,
+            geometry,
+            textures,
+            buffers,
+            parameters,
+            surfaces,
+            window,
+            light_groups,
+            host_ms,
+        })
     }
 
     /// Looks at the scene through another camera, on a whole film of `size` pixels. Fails if the device
@@ -217,6 +231,11 @@ impl SceneBuffers {
     /// Part of the film that the parameters describe.
     pub(crate) fn window(&self) -> Window {
         self.window
+    }
+
+    /// Groups of the scene's lights.
+    pub(crate) fn light_groups(&self) -> &LightGroups {
+        &self.light_groups
     }
 
     /// Host milliseconds by stage: `bvh`, `upload`.
@@ -304,6 +323,7 @@ struct Parts {
     lamps: LampTables,
     /// Choice by place, where there are many clusters.
     lamp_cells: Option<LampCells>,
+    light_groups: LightGroups,
     tables: MaterialTables,
     mattes: Mattes,
 }
@@ -311,11 +331,15 @@ struct Parts {
 impl Parts {
     fn new(device: &Arc<Device>, scene: &Scene, accel: &Accel) -> Result<Self> {
         let mut surfaces = SurfaceTables::new(&scene.materials);
-        let lamps = LampTables::new(scene, accel);
+        let light_groups = LightGroups::new(scene);
+        let lamps = LampTables::new(scene, accel, &light_groups);
         let has_cells = !lamps.clusters.is_empty();
         let lamp_cells = has_cells.then(|| LampCells::new(scene, accel, &lamps));
         for (surface, density) in surfaces.surfaces.iter_mut().zip(&lamps.emission_densities) {
             surface.emission_density = *density;
+        }
+        for (surface, material) in surfaces.surfaces.iter_mut().zip(&scene.materials) {
+            surface.light_group = light_groups.of_surface(&material.surface);
         }
         let attributes = TriangleAttributes::new(&scene.geometry, accel, surfaces.attributes);
         let textures = TextureBuffers::new(device, &surfaces, &attributes)?;
@@ -326,6 +350,6 @@ impl Parts {
         let geometry =
             GeometryBuffers::new(device, accel)?.traced_by_host(device, accel, passing)?;
         let mattes = Mattes::new(scene, accel);
-        Ok(Self { geometry, textures, lamps, lamp_cells, tables, mattes })
+        Ok(Self { geometry, textures, lamps, lamp_cells, light_groups, tables, mattes })
     }
 }

@@ -78,6 +78,8 @@ pub struct PathDemand {
     pub texels: u64,
     /// True if paths keep what the layers of surfaces show.
     pub has_features: bool,
+    /// Groups of lights that they keep apart.
+    pub light_groups: u32,
 }
 
 /// The passes of a sampler in one render, as the runner sees them.

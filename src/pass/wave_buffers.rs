@@ -44,6 +44,8 @@ pub struct WaveBuffers {
     path_lists: Buffer,
     lamp_lists: Buffer,
     features: Buffer,
+    group_radiance: Buffer,
+    lamp_groups: Buffer,
 }
 
 impl WaveBuffers {
@@ -61,7 +63,8 @@ impl WaveBuffers {
         let capabilities = device.capabilities();
         let widest =
             (size_of::<Hit>() as u64).max(u64::from(shadow_rays) * size_of::<ShadowRay>() as u64);
-        let widest = widest.max(demand.bytes);
+        let group_bytes = u64::from(demand.light_groups) * size_of::<[f32; 3]>() as u64;
+        let widest = widest.max(demand.bytes).max(group_bytes);
         let by_binding = capabilities.max_storage_buffer_range / widest;
         let by_texels = capabilities.max_texel_buffer_elements / demand.texels.max(1);
         let by_groups = u64::from(capabilities.max_workgroup_count) * u64::from(WORKGROUP_SIZE)
@@ -90,6 +93,11 @@ impl WaveBuffers {
         let lamp_lists = make("lamp lists", lamp_list_count, size_of::<u32>())?;
         let feature_count = if demand.has_features { paths } else { 1 };
         let features = make("features", feature_count, size_of::<Feature>())?;
+        let groups = u64::from(demand.light_groups);
+        let group_radiance =
+            make("group radiance", (groups * paths).max(1), size_of::<[f32; 3]>())?;
+        let lamp_group_count = if groups > 0 { paths } else { 1 };
+        let lamp_groups = make("lamp groups", lamp_group_count, size_of::<u32>())?;
         let path_lists = Buffer::new(device, "path lists", path_list_bytes(paths))?;
         let paths = make("paths", paths, size_of::<PathState>())?;
         let bound = [
@@ -107,6 +115,8 @@ impl WaveBuffers {
             (wave::PATH_LIST_TEXELS, &path_lists),
             (wave::LAMP_LISTS, &lamp_lists),
             (wave::FEATURES, &features),
+            (wave::GROUP_RADIANCE, &group_radiance),
+            (wave::LAMP_GROUPS, &lamp_groups),
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
         Ok(Self {
@@ -122,6 +132,8 @@ impl WaveBuffers {
             path_lists,
             lamp_lists,
             features,
+            group_radiance,
+            lamp_groups,
         })
     }
 
@@ -192,6 +204,8 @@ impl WaveBuffers {
             &self.path_lists,
             &self.lamp_lists,
             &self.features,
+            &self.group_radiance,
+            &self.lamp_groups,
         ]
         .map(|buffer| (buffer.name().to_owned(), buffer.size()))
         .into()

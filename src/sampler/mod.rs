@@ -152,6 +152,13 @@ impl Sampler {
                 )));
             }
         }
+        if aovs.contains(&Aov::LightGroups) && self.cohort_edge(parameters) > 1 {
+            return Err(Error::usage(format!(
+                "--aov light-groups with --set share-paths={}: paths that pixels share mix the light of \
+                 all groups; expected --set share-paths=off",
+                parameters.share_paths_text()
+            )));
+        }
         self.room().check(parameters, depth)
     }
 

@@ -5,7 +5,7 @@ use std::{any::Any, collections::BTreeMap, sync::Arc};
 use super::{Settings, traced_window, window_of};
 use crate::{
     error::{Error, Result},
-    film::{Sums, reconstruction::shared_offset, sums::Ahead},
+    film::{Aov, Sums, reconstruction::shared_offset, sums::Ahead},
     gpu::{Device, PassTimes},
     pass::{
         PassSettings, Progress, Report, Runner, SceneBuffers, Schedule, Technique, Totals,
@@ -13,14 +13,32 @@ use crate::{
         wave_buffers::most_paths,
     },
     sampler::Context,
-    scene::{Filter, Scene},
-    shader::structs::Wave,
+    scene::{Filter, Scene, light_group::LightGroups},
+    shader::{constants::MOST_LIGHT_GROUPS, structs::Wave},
 };
 
 /// Fewest paths in flight to try where memory does not suffice for more.
 const FEWEST_PATHS: u32 = 1 << 9;
 /// Factor between two tries.
 const PATHS_STEP: u32 = 1 << 4;
+
+/// Number of groups of lights that the settings ask for, before the work on buffers.
+fn light_groups(settings: &Settings, scene: &Scene) -> Result<u32> {
+    if !settings.aovs.contains(&Aov::LightGroups) {
+        return Ok(0);
+    }
+    let groups = LightGroups::new(scene);
+    let names = groups.names();
+    let count = u32::try_from(names.len()).unwrap_or(u32::MAX);
+    if count > MOST_LIGHT_GROUPS {
+        return Err(Error::usage(format!(
+            "--aov light-groups: expected at most {MOST_LIGHT_GROUPS} groups, found {count}: {}; give \
+             lamps and objects the same light_group",
+            names.join(", ")
+        )));
+    }
+    Ok(count)
+}
 
 /// A scene on a device, and the film it is rendered to.
 pub struct Renderer {
@@ -38,6 +56,7 @@ impl Renderer {
     /// out or a limit of the device is exceeded.
     pub fn new(device: &Arc<Device>, scene: &Scene, settings: Settings) -> Result<Self> {
         settings.check([scene.film.width, scene.film.height])?;
+        light_groups(&settings, scene)?;
         let window = traced_window(&settings, scene);
         let buffers = Arc::new(SceneBuffers::new(device, scene, window)?);
         Self::with_scene_buffers(device, buffers, scene, settings)
@@ -70,6 +89,7 @@ impl Renderer {
             shadow_rays: settings.shadow_rays,
             depth: settings.depth,
             aovs: aov_bits(&settings.aovs),
+            light_groups: light_groups(&settings, scene)?,
             roulette: settings.roulette,
             path_lists: settings.path_lists,
             cohort_edge,
@@ -79,7 +99,7 @@ impl Renderer {
             film_page_bytes: settings.film_page_bytes,
             most_paths: most_paths(device.capabilities()),
         };
-        check_memory(device, buffers.window(), passes.aovs)?;
+        check_memory(device, buffers.window(), passes.aovs, passes.light_groups)?;
         let demand = settings.sampler.demand(&settings.parameters, settings.shadow_rays);
         let attempt = |most_paths| -> Result<_> {
             let passes = PassSettings { most_paths, ..passes };
@@ -268,7 +288,7 @@ impl Renderer {
     pub fn sums(&self) -> Result<Sums> {
         let mut sums = self.runner.sums()?;
         if !self.ahead.is_none() {
-            sums.pending = self.runner.film().download_radiance()?;
+            self.runner.film().download_radiance(&mut sums)?;
             sums.ahead = self.ahead;
             sums.clear_behind();
         }

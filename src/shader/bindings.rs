@@ -284,6 +284,11 @@ binding_tables! {
         12 LAMP_LISTS: array uint;
         /// Layers of surfaces of each path, where they are asked for.
         13 FEATURES: array Feature;
+        /// Radiance of each path by groups of lights, where they are asked for: that of group `g` of path `i`
+        /// at `g · path_count + i`.
+        14 GROUP_RADIANCE: array vec3;
+        /// Group of the lamp of each path's last shadow ray to one, where groups are asked for.
+        15 LAMP_GROUPS: array uint;
     }
 
     /// Set 1 of the passes that show films in a window.
@@ -327,7 +332,7 @@ binding_tables! {
         /// Rest of the sum of squared radiance.
         11 FILM_SQUARES_COMPENSATION: array vec3;
         /// Radiance of the samples of one sweep, pixel by pixel, between one row of the page before and one
-        /// of the page after.
+        /// of the page after; that of the groups of lights follows each.
         12 FILM_RADIANCE: array vec3;
         /// Sum of the radiance of the pixel's own samples.
         13 FILM_UNFILTERED: array vec3;
@@ -335,6 +340,8 @@ binding_tables! {
         14 FILM_OBJECTS: array uvec2;
         /// The same of materials.
         15 FILM_MATERIALS: array uvec2;
+        /// Sum of the radiance of each group of lights, and its rest.
+        16 FILM_GROUPS: array vec3;
     }
 
     /// Set 3 of the probe kernels in `glsl/test`, which declare their own element types.

@@ -107,6 +107,8 @@ specializations! {
     CONSTANT_COMPENSATION;
     /// Candidates of `sample_lamps` for its shadow ray.
     CONSTANT_LAMP_CANDIDATES;
+    /// Groups of lights that all passes of a wave keep apart.
+    CONSTANT_LIGHT_GROUPS;
 
     // Specialization constant of the passes that share paths.
     /// Edge of a cohort, pixels: 2, 4 or 8.
@@ -187,6 +189,8 @@ constants! {
     AOV_MATERIALS = 256;
     /// Objects or materials that a pixel tells apart.
     MATTE_SLOTS = 6;
+    /// Most groups of lights that a film keeps apart.
+    MOST_LIGHT_GROUPS = 8;
 
     // Traversal.
     /// Entries of the traversal stack, one group of nodes per level of the tree.

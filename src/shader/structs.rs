@@ -188,6 +188,8 @@ structs! {
         inner: float,
         /// Cosine of the outer angle; for a falloff linear in the angle, that angle.
         outer: float,
+        /// Group of its light.
+        light_group: uint,
     }
 
     /// Column of the alias table over lamps and emitting triangles.
@@ -426,8 +428,10 @@ structs! {
         flags: uint,
         /// Density of sampling points on its emitting triangles, per square metre.
         emission_density: float,
+        /// Group of the emitted light.
+        light_group: uint,
         /// Zero; pads the last of four texels of four words.
-        reserved: vec2,
+        reserved: float,
     }
 
     /// Push constants of the passes over a wave of paths. Path `i` belongs to sample `first_sample + i

@@ -65,7 +65,8 @@ impl SurfaceTables {
                     SURFACE_EMISSION_TWO_SIDED,
                 ),
             emission_density: 0.0,
-            reserved: [0.0; 2],
+            light_group: 0,
+            reserved: 0.0,
         };
         self.attributes |= flag(surface.normal.is_some(), ATTRIBUTE_TANGENT)
             | flag(surface.vertex_color, ATTRIBUTE_COLOR);

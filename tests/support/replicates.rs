@@ -20,7 +20,7 @@ pub const BLOCK: u32 = 8;
 pub const LIMIT: f64 = 7.5;
 
 /// Averages radiance over every block of `edge` pixels, channels innermost, and over the whole film.
-fn block_means(sums: &Sums, edge: u32) -> Vec<f64> {
+pub fn block_means(sums: &Sums, edge: u32) -> Vec<f64> {
     let blocks_per_row = sums.width / edge;
     let mut means = vec![0.0; 3 * (blocks_per_row * (sums.height / edge)) as usize];
     for pixel in 0..sums.pixel_count() {

@@ -288,7 +288,7 @@ pub fn glazed_room() -> Scene {
     scene.geometry.uvs[0] = uvs.collect();
     let position = Vec3::new(0.3, 2.3, 0.4);
     let kind = LampKind::Point { position, intensity: Vec3::splat(1.5) };
-    scene.lamps.push(Lamp { name: "lamp".into(), kind });
+    scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
     scene.name = "glazed_room".into();
     scene.hash = scene.name.clone();
     scene

@@ -15,8 +15,8 @@ use crate::{
 
 /// Hashes camera, film, environment, materials and geometry; lower-case hexadecimal.
 ///
-/// Names, paths and the order of the text do not enter. A length precedes every array and a tag
-/// every variant, so that no two scenes give the same bytes.
+/// Names, but for those of groups of lights, paths and the order of the text do not enter. A length precedes
+/// every array and a tag every variant, so that no two scenes give the same bytes.
 pub(crate) fn hash(scene: &Scene) -> String {
     let mut hasher = Hasher(Sha256::new());
     let camera = &scene.camera;
@@ -57,6 +57,8 @@ pub fn geometry_hash(scene: &Scene) -> String {
 
 /// Follows the tags of lamps.
 const PORTAL_TAG: u32 = 3;
+/// Follows that of portals.
+const LIGHT_GROUP_TAG: u32 = 4;
 
 struct Hasher(Sha256);
 
@@ -91,6 +93,7 @@ impl Hasher {
         }
         for lamp in &scene.lamps {
             self.lamp(&lamp.kind);
+            self.light_group(lamp.light_group.as_deref());
         }
         for portal in &scene.portals {
             self.integers(&[PORTAL_TAG]);
@@ -186,6 +189,15 @@ impl Hasher {
         if let Some(emission) = emission {
             self.vectors(&[emission.radiance]);
             self.integers(&[u32::from(emission.two_sided)]);
+        }
+        self.light_group(surface.light_group.as_deref());
+    }
+
+    /// Layers of lights depend on their groups.
+    fn light_group(&mut self, name: Option<&str>) {
+        if let Some(name) = name {
+            self.integers(&[LIGHT_GROUP_TAG]);
+            self.array(name.as_bytes());
         }
     }
 

@@ -11,6 +11,8 @@ pub struct Lamp {
     pub name: String,
     /// Kind and its numbers.
     pub kind: LampKind,
+    /// Group of its light, as in [`LightGroups`](crate::light_group::LightGroups); none for `lamps`.
+    pub light_group: Option<String>,
 }
 
 /// Kind of a [`Lamp`].

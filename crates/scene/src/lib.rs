@@ -18,6 +18,7 @@ mod import;
 pub mod instance;
 mod instances;
 pub mod lamp;
+pub mod light_group;
 pub mod load;
 pub mod material;
 pub mod math;

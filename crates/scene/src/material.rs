@@ -55,6 +55,8 @@ pub struct Surface {
     pub opacity: Opacity,
     /// Light that the surface emits.
     pub emission: Option<Emission>,
+    /// Group of that light, as [`Lamp::light_group`](crate::Lamp::light_group).
+    pub light_group: Option<String>,
     /// False if the back reflects nothing and lets nothing through.
     pub two_sided: bool,
 }
@@ -70,6 +72,7 @@ impl Default for Surface {
             normal_scale: 1.0,
             opacity: Opacity::default(),
             emission: None,
+            light_group: None,
             two_sided: true,
         }
     }

@@ -8,8 +8,9 @@ use std::{
 };
 
 use fenestra_scene::{
-    Error, Scene,
+    Error, Scene, export,
     lamp::{LampKind, SpotFalloff},
+    light_group::LightGroups,
     load::{LoadOptions, arrays::Arrays},
     material::{ConductorFresnel, MaterialKind, Principled},
     mesh::Mesh,
@@ -288,8 +289,8 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
     case(
         &with_box("radius = 2"),
         "room.toml:18:1: unknown key `radius` in object of shape `box`, expected one of `name`, \
-         `mesh`, `shape`, `material`, `scale`, `rotate_deg`, `translate`, `size`, `bevel`, \
-         `bevel_segments`",
+         `mesh`, `shape`, `material`, `scale`, `rotate_deg`, `translate`, `light_group`, `size`, \
+         `bevel`, `bevel_segments`",
     );
     case(
         &with_box("").replace("\"box\"", "\"cube\""),
@@ -698,6 +699,45 @@ fn lamps_take_every_form_and_a_scene_needs_no_environment() {
     case("irradiance", "intensity", "unknown key `intensity` in lamp of type `directional`");
     let emission = dark.replace("\"diffuse\"", "\"diffuse\"\nemission = [1, 1, 1]");
     assert!(folder.load(&emission).unwrap().warnings.is_empty());
+}
+
+#[test]
+fn lamps_and_objects_name_groups_of_lights() {
+    let folder = Folder::new();
+    let object = |group: &str| {
+        format!("[[object]]\nshape = \"sphere\"\nradius = 1\nmaterial = \"grey\"\n{group}")
+    };
+    let dark = with_box("");
+    let lit = dark.replace("\"diffuse\"", "\"diffuse\"\nemission = [1, 1, 1]");
+    let lamp = "[[lamp]]\ntype = \"point\"\nposition = [1, 2, 3]\nintensity = [4, 5, 6]\n\
+                light_group = \"key\"\n";
+    let groups = |text: &str| LightGroups::new(&folder.load(text).unwrap()).names().to_vec();
+    assert_eq!(groups(&dark), ["environment"]);
+    assert_eq!(groups(&lit), ["environment", "lamps"]);
+    let named = "light_group = \"bulbs 2\"\n";
+    let all = format!("{lit}{}{0}{}{lamp}", object(named), object(""));
+    assert_eq!(groups(&all), ["environment", "bulbs 2", "key", "lamps"]);
+    // Both objects of the group have one material.
+    let scene = folder.load(&all).unwrap();
+    assert_eq!(scene.materials.len(), folder.load(&lit).unwrap().materials.len() + 1);
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let left_out = export::gltf::export(&scene, &folder.0.path().join("room.gltf")).warnings;
+    assert!(left_out.iter().any(|line| line.contains("light groups: left out, `bulbs 2`")));
+    let other = all.replace("bulbs 2", "bulbs 3");
+    assert_ne!(folder.load(&other).unwrap().hash, scene.hash);
+    let warnings = folder.load(&format!("{dark}{}", object(named))).unwrap().warnings;
+    assert!(
+        warnings[0].ends_with("ignored light_group: the object emits no light"),
+        "{warnings:?}"
+    );
+    for (name, text) in [("", &lamp), ("a.b", &lamp)] {
+        let message = folder.message(&format!("{dark}{}", text.replace("key", name)));
+        let expected = format!(
+            "light_group: expected up to 63 letters, digits, spaces, `_` and `-`, \
+                                found `{name}`"
+        );
+        assert!(message.contains(&expected), "{message}");
+    }
 }
 
 #[test]

@@ -328,6 +328,16 @@ impl Arguments {
         (!taken.is_empty()).then(|| format!("{} asks for {list}", scene.path.display()))
     }
 
+    /// Says that a sampler which shares paths does not, for the groups of lights.
+    pub(super) fn unshared(&self, settings: &Settings) -> Option<String> {
+        let edges =
+            [Parameters::default(), settings.parameters].map(|own| self.sampler.cohort_edge(&own));
+        let is_off = edges[0] > 1 && edges[1] == 1 && settings.depth > 1;
+        (is_off && self.aov.contains(&Aov::LightGroups)).then(|| {
+            format!("--aov light-groups: {} shares no paths (share-paths=off)", self.sampler.name())
+        })
+    }
+
     /// Samples that the scene's file asks for, where no option says when to stop.
     pub(super) fn asked_samples(&self, asked: Asked) -> Option<u32> {
         asked.samples.filter(|_| self.quality.is_none() && self.quality().is_some())
@@ -394,8 +404,9 @@ impl Arguments {
             }
         }
         let mut parameters = Parameters::default();
-        if denoises {
-            // Noise that the pixels of a cohort have in common looks like a pattern to the denoiser.
+        if denoises || self.aov.contains(&Aov::LightGroups) {
+            // Noise that the pixels of a cohort have in common looks like a pattern to the denoiser. Shared
+            // paths do not keep groups of lights apart.
             parameters.set("share-paths=off")?;
         }
         for assignment in &self.set {

@@ -103,6 +103,9 @@ impl Sequence {
         {
             say!("{line}");
         }
+        if let Some(line) = arguments.unshared(&settings).filter(|_| !arguments.quiet) {
+            say!("{line}");
+        }
         // Fail before the work, not after it.
         arguments.check_outputs(&scene, &output, self.denoises)?;
         sweep_leftovers(&output);

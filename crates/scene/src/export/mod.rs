@@ -15,7 +15,11 @@ mod subject;
 
 use glam::Vec3;
 
-use crate::{Scene, error::Result};
+use crate::{
+    Scene,
+    error::Result,
+    light_group::{ENVIRONMENT, LAMPS, LightGroups},
+};
 
 /// Settings of the render that are not part of the scene.
 #[derive(Clone, Copy, Debug)]
@@ -67,15 +71,25 @@ impl<'a> Export<'a> {
     }
 }
 
-/// Warning about the portals of `scene`, which no export has.
-fn portal_warning(scene: &Scene) -> Option<String> {
-    let first = scene.portals.first()?;
-    let first = if first.name.is_empty() { "the first" } else { &first.name };
-    Some(format!(
-        "portals: left out, {} in all, `{first}` among them; they change the noise of a picture, not \
-         what it shows",
-        scene.portals.len()
-    ))
+/// Warnings about the portals and the groups of lights of `scene`, which no export has.
+fn left_out(scene: &Scene) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if let Some(first) = scene.portals.first() {
+        let first = if first.name.is_empty() { "the first" } else { &first.name };
+        warnings.push(format!(
+            "portals: left out, {} in all, `{first}` among them; they change the noise of a picture, \
+             not what it shows",
+            scene.portals.len()
+        ));
+    }
+    let groups = LightGroups::new(scene);
+    let is_named = |name: &&String| ![ENVIRONMENT, LAMPS].contains(&name.as_str());
+    if let Some(first) = groups.names().iter().find(is_named) {
+        warnings.push(format!(
+            "light groups: left out, `{first}` among them; the picture does not depend on them"
+        ));
+    }
+    warnings
 }
 
 /// Tests for insides that absorb, for which other renderers need an integrator of their own.

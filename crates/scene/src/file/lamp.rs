@@ -12,6 +12,8 @@ pub(crate) struct LampEntry {
     pub name: Option<String>,
     /// Kind and its numbers.
     pub kind: LampKindEntry,
+    /// Group of its light.
+    pub light_group: Option<String>,
 }
 
 /// Keys of a `[[lamp]]` that depend on its `type`.

@@ -149,6 +149,8 @@ pub(crate) struct ObjectKeys {
     /// Translation, metres, applied last.
     #[serde(default)]
     pub translate: [f32; 3],
+    /// Group of the light that it emits. Default: lamps.
+    pub light_group: Option<String>,
 }
 
 #[derive(Debug)]

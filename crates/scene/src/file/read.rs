@@ -32,6 +32,8 @@ struct LampKeys {
     name: Option<String>,
     /// Kind.
     r#type: Spanned<String>,
+    /// Group of its light, for `--aov LightGroups`. Default: lamps.
+    light_group: Option<String>,
 }
 
 /// Tables that have no kinds.
@@ -114,7 +116,7 @@ fn read_lamp(entry: Spanned<DeValue>, text: &str) -> Result<LampEntry, TextError
     let label = keys.name.as_ref().map_or("lamp".to_owned(), |name| format!("lamp `{name}`"));
     let owner = format!("{label} of type `{type_name}`");
     let kind = rest.read_kind("lamp type", &keys.r#type, LAMPS, &owner)?;
-    Ok(LampEntry { line, name: keys.name, kind })
+    Ok(LampEntry { line, name: keys.name, kind, light_group: keys.light_group })
 }
 
 /// Reads an entry of an array of tables that has no kinds; `header` names it.

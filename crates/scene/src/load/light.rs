@@ -151,6 +151,21 @@ impl Loader<'_> {
                 irradiance: power("irradiance", entry.irradiance)?,
             },
         };
-        Ok(Lamp { name: entry.name.clone().unwrap_or_default(), kind })
+        self.check_light_group(&label, entry.light_group.as_deref())?;
+        let name = entry.name.clone().unwrap_or_default();
+        Ok(Lamp { name, kind, light_group: entry.light_group.clone() })
+    }
+
+    /// Checks that a group can name a layer of an image.
+    pub(super) fn check_light_group(&self, label: &str, name: Option<&str>) -> Result<()> {
+        let is_known = |letter: char| letter.is_alphanumeric() || " _-".contains(letter);
+        let fits = |name: &str| !name.is_empty() && name.len() < 64 && name.chars().all(is_known);
+        self.check(name.is_none_or(fits), || {
+            format!(
+                "{label}: light_group: expected up to 63 letters, digits, spaces, `_` and `-`, found \
+                 `{}`",
+                name.unwrap_or_default()
+            )
+        })
     }
 }

@@ -51,6 +51,7 @@ impl Loader<'_> {
             let ObjectKeys { scale, rotate_deg, translate, .. } = &object.keys;
             self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
             self.check_material(&label, object, materials)?;
+            self.check_light_group(&label, object.keys.light_group.as_deref())?;
             *uses.entry(self.mesh_key(object)).or_default() += 1;
         }
         let keys = |is_asked: &dyn Fn(Option<&Material>) -> bool| -> HashSet<PathBuf> {
@@ -278,6 +279,10 @@ impl Loader<'_> {
         let first_vertex = geometry.positions.len();
         let is_named = |material: &Material| Some(&material.name) == object.keys.material.as_ref();
         let named = materials.iter().position(is_named);
+        let named = match (&object.keys.light_group, named) {
+            (Some(group), Some(named)) => Some(lit_material(named, group, materials)),
+            (_, named) => named,
+        };
         let first_own = materials.len();
         if named.is_none() {
             let colored =
@@ -288,10 +293,15 @@ impl Loader<'_> {
                      to every triangle"
                 )
             })?;
+            let light_group = &object.keys.light_group;
             let object = object.keys.name.as_deref().unwrap_or("mesh");
             materials.extend(mesh.materials.iter().map(|MeshMaterial { material, .. }| {
                 let name = format!("{object}/{}", material.name);
-                Material { name, ..material.clone() }
+                let mut own = Material { name, ..material.clone() };
+                if own.surface.emission.is_some() {
+                    own.surface.light_group.clone_from(light_group);
+                }
+                own
             }));
         }
         let own = named.map_or(&materials[first_own..], |index| &materials[index..=index]);
@@ -318,11 +328,31 @@ impl Loader<'_> {
             self.check_extent(label, placed)?;
             warnings.extend(dropped.warnings(label, of));
         }
+        if object.keys.light_group.is_some() && !emits(object, mesh, materials) {
+            warnings.push(format!("{label}: ignored light_group: the object emits no light"));
+        }
         if of == 0 {
             warnings.push(format!("{label}: the mesh has no triangles"));
         }
         Ok(())
     }
+}
+
+/// Finds a material whose light belongs to a group, as `of` looks, or adds it.
+fn lit_material(of: usize, group: &str, materials: &mut Vec<Material>) -> usize {
+    let mut lit = materials[of].clone();
+    if lit.surface.emission.is_none() {
+        return of;
+    }
+    lit.surface.light_group = Some(group.to_owned());
+    let is_it = |known: &Material| {
+        known.name == lit.name && known.surface.light_group == lit.surface.light_group
+    };
+    let found = materials.iter().position(is_it);
+    found.unwrap_or_else(|| {
+        materials.push(lit);
+        materials.len() - 1
+    })
 }
 
 /// Material of a triangle among those of its mesh file.

@@ -55,7 +55,7 @@ impl Reader {
         parameters.finish(&mut self.ignored);
         if let Some(kind) = kind {
             let name = node.attribute("id").unwrap_or_default().to_owned();
-            self.lamps.push(Lamp { name, kind });
+            self.lamps.push(Lamp { name, kind, light_group: None });
         }
         Ok(())
     }

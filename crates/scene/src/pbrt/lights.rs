@@ -186,7 +186,7 @@ impl Lights {
             return Err(entity.error(format!("expected finite light of at least 0, found {color}")));
         }
         let name = format!("{} of line {}", entity.name, entity.place.line);
-        self.lamps.push(Lamp { name, kind });
+        self.lamps.push(Lamp { name, kind, light_group: None });
         Ok(())
     }
 

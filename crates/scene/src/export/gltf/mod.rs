@@ -24,8 +24,8 @@ use self::{
 use super::{
     Export,
     folder::{ENVIRONMENT, Folder, identifier},
+    left_out,
     parts::{self, Parts},
-    portal_warning,
     subject::Subject,
 };
 use crate::{Scene, files};
@@ -58,7 +58,7 @@ pub fn export<'a>(scene: &'a Scene, path: &Path) -> Export<'a> {
     if !lights.is_empty() {
         textures.extensions.insert("KHR_lights_punctual");
     }
-    warnings.extend(portal_warning(scene));
+    warnings.extend(left_out(scene));
     let rotation_deg = scene.environment.rotation_rad.to_degrees();
     warnings.push(format!(
         "environment: glTF has none; render with `--environment {}/{ENVIRONMENT} \

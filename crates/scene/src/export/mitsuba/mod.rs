@@ -26,9 +26,9 @@ use super::{
     folder::{Folder, identifier},
     has_media,
     images::Pictures,
+    left_out,
     parts::{self, Parts},
     ply::{Attributes, SAME_UV},
-    portal_warning,
     subject::Subject,
     triple,
 };
@@ -50,7 +50,7 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
     });
     let models: Vec<Model> = models.collect();
     let lamps: String = scene.lamps.iter().map(|lamp| lights::lamp(lamp, &mut warnings)).collect();
-    warnings.extend(portal_warning(scene));
+    warnings.extend(left_out(scene));
     let path = path.to_owned();
     Export::new(warnings, move || {
         let mut xml = format!(

@@ -24,9 +24,8 @@ use super::{
     folder::{Folder, identifier},
     has_media,
     images::Pictures,
-    parts,
+    left_out, parts,
     ply::Attributes,
-    portal_warning,
     subject::Subject,
 };
 use crate::{Camera, Filter, Scene, files};
@@ -50,7 +49,7 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
     });
     let models: Vec<Model> = models.collect();
     let lamps: String = scene.lamps.iter().map(|lamp| lights::lamp(lamp, &mut warnings)).collect();
-    warnings.extend(portal_warning(scene));
+    warnings.extend(left_out(scene));
     let path = path.to_owned();
     Export::new(warnings, move || {
         let mut text = format!("# Written by Fenestra {}.\n", env!("CARGO_PKG_VERSION"));

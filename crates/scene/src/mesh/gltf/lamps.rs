@@ -78,7 +78,7 @@ impl GltfReader<'_> {
             self.ignored.add(features::GLTF_LIGHT_RANGE, place);
         }
         let name = light["name"].as_str().or(node.name()).unwrap_or_default().to_owned();
-        self.mesh.lamps.push(Lamp { name, kind });
+        self.mesh.lamps.push(Lamp { name, kind, light_group: None });
         Ok(())
     }
 }
