@@ -18,6 +18,7 @@ use crate::measured::{
     base::separable_base,
     layout::*,
     lookup,
+    rgl::Traits,
     tabulate::{EnergyLimit, SamplingRow, directional_albedo},
 };
 
@@ -39,6 +40,8 @@ pub struct MeasuredTable {
     pub invalid_cell_count: usize,
     /// Repairs made while reading, for the log.
     pub warnings: Vec<String>,
+    /// Describes the file if it is one of RGL.
+    pub rgl: Option<Traits>,
 }
 
 impl fmt::Debug for MeasuredTable {
@@ -160,7 +163,7 @@ impl MeasuredTable {
                 *word = value.to_bits();
             }
         }
-        Ok(Self { words, invalid_cell_count, warnings })
+        Ok(Self { words, invalid_cell_count, warnings, rgl: None })
     }
 
     /// Words for the shader: `MEASURED_GRID_OFFSET`, then 2 per cell.

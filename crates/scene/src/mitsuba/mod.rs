@@ -40,13 +40,15 @@ use super::{
     instances::Prototype,
 };
 use crate::{
-    beside::Folder, error::Result, import::Imported, material::Material, texture::TextureCache,
+    beside::Folder, error::Result, import::Imported, material::Material, measured::MeasuredTable,
+    texture::TextureCache,
 };
 
 /// Scene on its way from the document.
 struct Reader<'a> {
     document: &'a Document,
     textures: TextureCache,
+    tables: HashMap<PathBuf, Arc<MeasuredTable>>,
     environment: Option<EnvironmentMap>,
     lamps: Vec<Lamp>,
     materials: Vec<Material>,
@@ -78,6 +80,7 @@ pub(crate) fn read(path: &Path, camera: Option<&str>, folder: Folder) -> Result<
     let mut reader = Reader {
         document: &document,
         textures: TextureCache::default(),
+        tables: HashMap::new(),
         environment: None,
         lamps: Vec::new(),
         materials: Vec::new(),

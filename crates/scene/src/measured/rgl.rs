@@ -1,0 +1,416 @@
+//! RGL `.bsdf` files: measurements in an adaptive parameterisation \[Dupuy & Jakob 2018\] →
+//! [`AdaptiveBrdf`], which is the file's own interpolation, → [`MeasuredTable`].
+//!
+//! Angles are numbers of the unit square: √(2θ/π) and (φ + π)/2π. For each of the measured directions
+//! (θ_i, φ_i) the file has a density of microfacet normals ω_m over that square, `vndf`, and a picture
+//! of colours over the random numbers that the density makes normals of. Reflected light is
+//! f·cosθ_o = picture(vndf⁻¹(ω_m)) · D(ω_m) / 4σ(ω_i), with `ndf` for D and
+//! `sigma` for the projected area σ. Isotropic files take φ_m relative to φ_i.
+
+use std::{
+    f64::consts::{FRAC_PI_2, PI, TAU},
+    path::Path,
+};
+
+use glam::{DVec3, Vec3, dvec3};
+
+use crate::{
+    error::Result,
+    measured::{table::MeasuredTable, tensor::TensorFile},
+    spectrum,
+};
+
+/// Turns over which an anisotropic BRDF is averaged. An odd count visits twice as many where half a turn
+/// changes nothing.
+const TURNS: u32 = 17;
+
+/// Parts of a file that the baked table has no place for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Traits {
+    /// The BRDF depends on the turn of the surface about its normal; the table holds the mean.
+    pub is_anisotropic: bool,
+    /// The file has spectra; the table holds their linear sRGB under D65.
+    pub is_spectral: bool,
+}
+
+/// Values at the nodes of a regular grid over the unit square, bilinear between them.
+struct Grid {
+    values: Vec<f32>,
+    columns: usize,
+    rows: usize,
+}
+
+/// Place in a grid: the node before it, and how far it is from there, 0…1.
+#[derive(Clone, Copy)]
+struct Cell {
+    column: usize,
+    row: usize,
+    x: f64,
+    y: f64,
+}
+
+impl Cell {
+    fn new([x, y]: [f64; 2], columns: usize, rows: usize) -> Self {
+        let along = |position: f64, nodes: usize| {
+            let position = position.clamp(0.0, 1.0) * (nodes - 1) as f64;
+            let node = (position as usize).min(nodes - 2);
+            (node, position - node as f64)
+        };
+        let ((column, x), (row, y)) = (along(x, columns), along(y, rows));
+        Self { column, row, x, y }
+    }
+
+    /// Weights of the four nodes around, those of the next row last.
+    fn weights(self) -> [f64; 4] {
+        let Self { x, y, .. } = self;
+        [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y]
+    }
+
+    /// Indices of the four nodes around.
+    fn nodes(self, columns: usize) -> [usize; 4] {
+        let first = self.row * columns + self.column;
+        [first, first + 1, first + columns, first + columns + 1]
+    }
+}
+
+impl Grid {
+    /// Reads a field of two dimensions, none of its values negative.
+    fn read(file: &TensorFile<'_>, name: &str) -> Result<Self> {
+        let (values, [rows, columns]) = file.floats(name)?;
+        check_grid(file, name, &values, columns, rows)?;
+        Ok(Self { values, columns, rows })
+    }
+
+    fn at(&self, place: [f64; 2]) -> f64 {
+        let cell = Cell::new(place, self.columns, self.rows);
+        let value = |node: usize| f64::from(self.values[node]);
+        cell.nodes(self.columns).map(value).iter().zip(cell.weights()).map(|(v, w)| v * w).sum()
+    }
+}
+
+/// Fails for a grid of fewer than two nodes along an axis, or with a negative value.
+fn check_grid(
+    file: &TensorFile<'_>,
+    name: &str,
+    values: &[f32],
+    columns: usize,
+    rows: usize,
+) -> Result<()> {
+    if columns < 2 || rows < 2 {
+        let message = format!("expected a grid of 2 × 2 or more, found {columns} × {rows}");
+        return Err(file.error(format!("field `{name}`: {message}")));
+    }
+    match values.iter().find(|value| **value < 0.0) {
+        None => Ok(()),
+        Some(value) => {
+            Err(file.error(format!("field `{name}`: expected no negative number, found {value}")))
+        }
+    }
+}
+
+/// Density of normals for one measured direction, of integral 1 over the nodes' unit steps, with its
+/// integrals up to each node.
+struct Slice {
+    density: Vec<f32>,
+    /// Along each row up to a column.
+    along: Vec<f32>,
+    /// Over the rows up to a row.
+    up_to: Vec<f32>,
+}
+
+impl Slice {
+    /// `None` if the density is 0 everywhere.
+    fn new(values: &[f32], columns: usize) -> Option<Self> {
+        let mut along = vec![0.0_f64; values.len()];
+        let mut up_to = vec![0.0_f64; values.len() / columns];
+        for row in 0..up_to.len() {
+            let first = row * columns;
+            for node in first + 1..first + columns {
+                let both = f64::from(values[node - 1]) + f64::from(values[node]);
+                along[node] = along[node - 1] + 0.5 * both;
+            }
+            if row > 0 {
+                let both = along[first - 1] + along[first + columns - 1];
+                up_to[row] = up_to[row - 1] + 0.5 * both;
+            }
+        }
+        let scale = up_to.last().filter(|total| **total > 0.0)?.recip();
+        let scaled = |values: &[f64]| values.iter().map(|value| (value * scale) as f32).collect();
+        let density = values.iter().map(|value| (f64::from(*value) * scale) as f32).collect();
+        Some(Self { density, along: scaled(&along), up_to: scaled(&up_to) })
+    }
+}
+
+/// Measured BRDF as its file interpolates it.
+pub struct AdaptiveBrdf {
+    theta: Vec<f32>,
+    phi: Vec<f32>,
+    ndf: Grid,
+    sigma: Grid,
+    /// By φ_i, then θ_i.
+    slices: Vec<Slice>,
+    /// Columns and rows of the slices.
+    size: [usize; 2],
+    /// Pictures in the order of the slices.
+    colors: Vec<Vec3>,
+    /// Columns and rows of the pictures.
+    color_size: [usize; 2],
+    /// False if the pictures hold f·cosθ_o itself.
+    is_relative: bool,
+    /// Signs of x and y that carry directions into the measured part of a symmetric BRDF.
+    symmetries: &'static [[f64; 2]],
+    traits: Traits,
+    clipped_count: usize,
+}
+
+/// Reads a file and bakes it on the half/difference grid.
+///
+/// The grid is reciprocal: the two values of a pair of directions enter with the cosine that divides
+/// them as a weight, so that neither is large where its cosine is small.
+pub fn load(path: &Path) -> Result<MeasuredTable> {
+    let brdf = AdaptiveBrdf::read(path)?;
+    let turns = if brdf.traits.is_anisotropic { TURNS } else { 1 };
+    let bake = |outgoing: Vec3, incident: Vec3| {
+        let sum: DVec3 = (0..turns)
+            .map(|turn| {
+                let turned = |d: Vec3| {
+                    let (sine, cosine) = (TAU * f64::from(turn) / f64::from(turns)).sin_cos();
+                    let d = d.as_dvec3();
+                    dvec3(cosine * d.x - sine * d.y, sine * d.x + cosine * d.y, d.z)
+                };
+                let (outgoing, incident) = (turned(outgoing), turned(incident));
+                brdf.reflected(outgoing, incident) + brdf.reflected(incident, outgoing)
+            })
+            .sum();
+        (sum / f64::from(turns) / f64::from(outgoing.z + incident.z)).as_vec3()
+    };
+    let mut table = MeasuredTable::tabulate(bake)
+        .map_err(|message| crate::error::Error::format(path, message))?;
+    if brdf.traits.is_anisotropic {
+        table.warnings.push(
+            "anisotropic: rendered as its mean over all turns about the normal, which looks alike from \
+             all sides"
+                .to_owned(),
+        );
+    }
+    if brdf.clipped_count > 0 {
+        table.warnings.push(format!(
+            "{} of {} colours are beyond Rec.709 or negative; their negative channels were set to 0",
+            brdf.clipped_count,
+            brdf.colors.len()
+        ));
+    }
+    table.rgl = Some(brdf.traits);
+    Ok(table)
+}
+
+impl AdaptiveBrdf {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`crate::Error::Format`] for a file that is truncated, lacks a field or has one of another type,
+    /// shape or range.
+    pub fn read(path: &Path) -> Result<Self> {
+        let file = TensorFile::read(path)?;
+        let theta = angles(&file, "theta_i")?;
+        let phi = angles(&file, "phi_i")?;
+        let (ndf, sigma) = (Grid::read(&file, "ndf")?, Grid::read(&file, "sigma")?);
+        let (values, [of_phi, of_theta, rows, columns]) = file.floats("vndf")?;
+        check_grid(&file, "vndf", &values, columns, rows)?;
+        check_directions(&file, "vndf", [of_phi, of_theta], [&phi, &theta])?;
+        let slices: Option<_> =
+            values.chunks_exact(columns * rows).map(|slice| Slice::new(slice, columns)).collect();
+        let slices = slices.ok_or_else(|| {
+            file.error("field `vndf`: expected a density above 0 for each direction, found 0")
+        })?;
+
+        let is_spectral = !file.has("rgb");
+        let name = if is_spectral { "spectra" } else { "rgb" };
+        let (values, [of_phi, of_theta, channels, color_rows, color_columns]) =
+            file.floats(name)?;
+        check_directions(&file, name, [of_phi, of_theta], [&phi, &theta])?;
+        check_grid(&file, name, &[], color_columns, color_rows)?;
+        let weights = if is_spectral {
+            let (wavelengths, [_]) = file.floats("wavelengths")?;
+            check_rising(&file, "wavelengths", &wavelengths)?;
+            let wavelengths: Vec<f64> = wavelengths.iter().map(|nm| f64::from(*nm)).collect();
+            spectrum::srgb_weights(&wavelengths).ok_or_else(|| {
+                file.error("field `wavelengths`: expected nm, of which some are visible")
+            })?
+        } else {
+            vec![DVec3::X, DVec3::Y, DVec3::Z]
+        };
+        if channels != weights.len() {
+            return Err(file.error(format!(
+                "field `{name}`: expected {} colours or wavelengths, found {channels}",
+                weights.len()
+            )));
+        }
+        let mut clipped_count = 0;
+        let texels = color_rows * color_columns;
+        let mut colors = Vec::with_capacity(values.len() / channels);
+        for picture in values.chunks_exact(channels * texels) {
+            for texel in 0..texels {
+                let channels = picture[texel..].iter().step_by(texels);
+                let color: DVec3 =
+                    channels.zip(&weights).map(|(value, weight)| *weight * f64::from(*value)).sum();
+                clipped_count += usize::from(color.min_element() < 0.0);
+                colors.push(color.max(DVec3::ZERO).as_vec3());
+            }
+        }
+
+        // Two azimuths or fewer are one, as for Mitsuba.
+        let is_anisotropic = phi.len() > 2;
+        let range = f64::from(phi[phi.len() - 1] - phi[0]);
+        let symmetries: &[[f64; 2]] = match (TAU / range).round() as i64 {
+            _ if !is_anisotropic => &[[1.0, 1.0]],
+            1 => &[[1.0, 1.0]],
+            2 => &[[1.0, 1.0], [-1.0, -1.0]],
+            4 => &[[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]],
+            _ => {
+                return Err(file.error(format!(
+                    "field `phi_i`: expected a whole, half or quarter turn, found {:.1}°",
+                    range.to_degrees()
+                )));
+            }
+        };
+        Ok(Self {
+            theta,
+            phi,
+            ndf,
+            sigma,
+            slices,
+            size: [columns, rows],
+            colors,
+            color_size: [color_columns, color_rows],
+            is_relative: file.flag("jacobian")?,
+            symmetries,
+            traits: Traits { is_anisotropic, is_spectral },
+            clipped_count,
+        })
+    }
+
+    /// Light reflected toward `outgoing` of a unit of radiance per steradian from `incident`, f·cosθ, 1/sr:
+    /// `outgoing` is the measurement's ω_i, and the cosine is that of `incident`. 0 unless both are above
+    /// the surface.
+    pub fn reflected(&self, outgoing: DVec3, incident: DVec3) -> DVec3 {
+        if outgoing.z <= 0.0 || incident.z <= 0.0 {
+            return DVec3::ZERO;
+        }
+        // Carry both into the part of the circle that was measured.
+        let middle = 0.5 * f64::from(self.phi[0] + self.phi[self.phi.len() - 1]);
+        let signed = |d: DVec3, [x, y]: [f64; 2]| dvec3(x * d.x, y * d.y, d.z);
+        let off_middle = |signs: [f64; 2]| {
+            let d = signed(outgoing, signs);
+            ((d.y.atan2(d.x) - middle + PI).rem_euclid(TAU) - PI).abs()
+        };
+        let nearest = |a: &&[f64; 2], b: &&[f64; 2]| off_middle(**a).total_cmp(&off_middle(**b));
+        let signs = self.symmetries.iter().min_by(nearest).copied().unwrap_or([1.0, 1.0]);
+        let (outgoing, incident) = (signed(outgoing, signs), signed(incident, signs));
+
+        let angles = |d: DVec3| (d.truncate().length().atan2(d.z), d.y.atan2(d.x));
+        let (theta_i, phi_i) = angles(outgoing);
+        let (theta_m, phi_m) = angles(outgoing + incident);
+        let turn = if self.traits.is_anisotropic { 0.0 } else { phi_i };
+        let square =
+            |theta: f64, phi: f64| [(theta / FRAC_PI_2).sqrt(), ((phi + PI) / TAU).rem_euclid(1.0)];
+        let normal = square(theta_m, phi_m - turn);
+        let (phi_lower, phi_share) = interval(&self.phi, phi_i);
+        let (theta_lower, theta_share) = interval(&self.theta, theta_i);
+        let mut slices = [(0, 0.0); 4];
+        for (corner, slice) in slices.iter_mut().enumerate() {
+            let (of_phi, of_theta) = (corner / 2, corner % 2);
+            let weight = |upper: usize, share: f64| if upper == 1 { share } else { 1.0 - share };
+            let phi = (phi_lower + of_phi).min(self.phi.len() - 1);
+            let theta = (theta_lower + of_theta).min(self.theta.len() - 1);
+            *slice = (
+                phi * self.theta.len() + theta,
+                weight(of_phi, phi_share) * weight(of_theta, theta_share),
+            );
+        }
+        let [columns, rows] = self.color_size;
+        let cell = Cell::new(self.random_numbers(normal, &slices), columns, rows);
+        let mut color = DVec3::ZERO;
+        for (slice, weight) in slices.into_iter().filter(|slice| slice.1 > 0.0) {
+            let picture = &self.colors[slice * columns * rows..][..columns * rows];
+            for (node, share) in cell.nodes(columns).into_iter().zip(cell.weights()) {
+                color += weight * share * picture[node].as_dvec3();
+            }
+        }
+        if !self.is_relative {
+            return color;
+        }
+        let area = self.sigma.at(square(theta_i, phi_i));
+        if area > 0.0 { color * self.ndf.at(normal) / (4.0 * area) } else { DVec3::ZERO }
+    }
+
+    /// Random numbers that the density, mixed of slices by their weights, makes a place of: its share of
+    /// the row there up to the place, and the share of the rows below.
+    fn random_numbers(&self, place: [f64; 2], slices: &[(usize, f64)]) -> [f64; 2] {
+        let [columns, rows] = self.size;
+        let cell = Cell::new(place, columns, rows);
+        let mixed = |value: &dyn Fn(&Slice) -> f32| -> f64 {
+            let used = slices.iter().filter(|slice| slice.1 > 0.0);
+            used.map(|&(slice, weight)| weight * f64::from(value(&self.slices[slice]))).sum()
+        };
+        let mix = |low: f64, high: f64, share: f64| low + share * (high - low);
+        // Integral from a node to a share of the way to the next.
+        let part = |low: f64, high: f64, share: f64| share * mix(low, high, 0.5 * share);
+        let nodes = cell.nodes(columns);
+        let density = nodes.map(|node| mixed(&|slice| slice.density[node]));
+        let ends = [cell.row, cell.row + 1].map(|row| {
+            let last = row * columns + columns - 1;
+            mixed(&|slice| slice.along[last])
+        });
+        let before = |node: usize| mixed(&|slice| slice.along[node]);
+        let low = mix(density[0], density[2], cell.y);
+        let high = mix(density[1], density[3], cell.y);
+        let along = mix(before(nodes[0]), before(nodes[2]), cell.y) + part(low, high, cell.x);
+        let row = mix(ends[0], ends[1], cell.y);
+        let below = mixed(&|slice| slice.up_to[cell.row]) + part(ends[0], ends[1], cell.y);
+        [if row > 0.0 { along / row } else { 0.0 }, below]
+    }
+}
+
+/// Node before a value among rising ones, and the share of the way to the next; ends are held.
+fn interval(nodes: &[f32], value: f64) -> (usize, f64) {
+    let next = nodes.partition_point(|node| f64::from(*node) <= value);
+    let node = next.saturating_sub(1).min(nodes.len().saturating_sub(2));
+    let low = f64::from(nodes[node]);
+    let width = nodes.get(node + 1).map_or(1.0, |high| f64::from(*high) - low);
+    (node, if nodes.len() > 1 { ((value - low) / width).clamp(0.0, 1.0) } else { 0.0 })
+}
+
+/// Rising angles of a field, radians.
+fn angles(file: &TensorFile<'_>, name: &str) -> Result<Vec<f32>> {
+    let (values, [_]) = file.floats(name)?;
+    check_rising(file, name, &values)?;
+    Ok(values)
+}
+
+fn check_rising(file: &TensorFile<'_>, name: &str, values: &[f32]) -> Result<()> {
+    match values.windows(2).find(|pair| pair[0] >= pair[1]) {
+        None => Ok(()),
+        Some(pair) => {
+            let message = format!("expected rising numbers, found {} after {}", pair[1], pair[0]);
+            Err(file.error(format!("field `{name}`: {message}")))
+        }
+    }
+}
+
+/// Fails for a field whose first dimensions are not those of the measured directions.
+fn check_directions(
+    file: &TensorFile<'_>,
+    name: &str,
+    found: [usize; 2],
+    nodes: [&[f32]; 2],
+) -> Result<()> {
+    let expected = nodes.map(<[f32]>::len);
+    if found == expected {
+        return Ok(());
+    }
+    Err(file.error(format!(
+        "field `{name}`: expected {} × {} directions as phi_i × theta_i, found {} × {}",
+        expected[0], expected[1], found[0], found[1]
+    )))
+}
