@@ -123,10 +123,10 @@ impl Pictures {
     }
 }
 
-/// Name of a copied file.
+/// Name of a copied file, an RGL measurement.
 fn copied_name(index: usize, path: &Path) -> String {
     let stem = safe_name(&path.file_stem().unwrap_or_default().to_string_lossy());
-    format!("f{index:02}_{stem}.{}", files::extension(path))
+    format!("f{index:02}_{stem}.bsdf")
 }
 
 /// Texels without a change, of 8 or 16 bits.

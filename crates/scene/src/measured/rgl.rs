@@ -12,10 +12,10 @@ use std::{
     path::Path,
 };
 
-use glam::{DVec3, Vec3, dvec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
-    error::Result,
+    error::{Error, Result},
     measured::{table::MeasuredTable, tensor::TensorFile},
     spectrum,
 };
@@ -159,47 +159,17 @@ pub struct AdaptiveBrdf {
     is_relative: bool,
     /// Signs of x and y that carry directions into the measured part of a symmetric BRDF.
     symmetries: &'static [[f64; 2]],
-    traits: Traits,
+    /// Parts that the table has no place for.
+    pub traits: Traits,
     clipped_count: usize,
 }
 
-/// Reads a file and bakes it on the half/difference grid.
-///
-/// The grid is reciprocal: the two values of a pair of directions enter with the cosine that divides
-/// them as a weight, so that neither is large where its cosine is small.
+/// Reads a file and bakes [`AdaptiveBrdf::value`] on the half/difference grid.
 pub fn load(path: &Path) -> Result<MeasuredTable> {
     let brdf = AdaptiveBrdf::read(path)?;
-    let turns = if brdf.traits.is_anisotropic { TURNS } else { 1 };
-    let bake = |outgoing: Vec3, incident: Vec3| {
-        let sum: DVec3 = (0..turns)
-            .map(|turn| {
-                let turned = |d: Vec3| {
-                    let (sine, cosine) = (TAU * f64::from(turn) / f64::from(turns)).sin_cos();
-                    let d = d.as_dvec3();
-                    dvec3(cosine * d.x - sine * d.y, sine * d.x + cosine * d.y, d.z)
-                };
-                let (outgoing, incident) = (turned(outgoing), turned(incident));
-                brdf.reflected(outgoing, incident) + brdf.reflected(incident, outgoing)
-            })
-            .sum();
-        (sum / f64::from(turns) / f64::from(outgoing.z + incident.z)).as_vec3()
-    };
-    let mut table = MeasuredTable::tabulate(bake)
-        .map_err(|message| crate::error::Error::format(path, message))?;
-    if brdf.traits.is_anisotropic {
-        table.warnings.push(
-            "anisotropic: rendered as its mean over all turns about the normal, which looks alike from \
-             all sides"
-                .to_owned(),
-        );
-    }
-    if brdf.clipped_count > 0 {
-        table.warnings.push(format!(
-            "{} of {} colours are beyond Rec.709 or negative; their negative channels were set to 0",
-            brdf.clipped_count,
-            brdf.colors.len()
-        ));
-    }
+    let mut table = MeasuredTable::tabulate(|outgoing, incident| brdf.value(outgoing, incident))
+        .map_err(|message| Error::format(path, message))?;
+    table.warnings.extend(brdf.warnings());
     table.rgl = Some(brdf.traits);
     Ok(table)
 }
@@ -290,6 +260,41 @@ impl AdaptiveBrdf {
         })
     }
 
+    /// Parts that [`Self::value`] leaves out, for the log.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.traits.is_anisotropic {
+            let mean = "anisotropic: rendered as its mean over all turns about the normal, which looks \
+                        alike from all sides";
+            warnings.push(mean.to_owned());
+        }
+        if self.clipped_count > 0 {
+            warnings.push(format!(
+                "{} of {} colours are beyond Rec.709 or negative; their negative channels were set to 0",
+                self.clipped_count,
+                self.colors.len()
+            ));
+        }
+        warnings
+    }
+
+    /// Value in 1/sr, without the cosine, for the table: the mean over all turns, and reciprocal. The two
+    /// values of a pair of directions enter with the cosine that divides them as a weight, so that
+    /// neither is large where its cosine is small.
+    pub fn value(&self, outgoing: Vec3, incident: Vec3) -> Vec3 {
+        let turns = if self.traits.is_anisotropic { TURNS } else { 1 };
+        let both = |turn: u32| {
+            let angle = TAU * f64::from(turn) / f64::from(turns);
+            let [outgoing, incident] = [outgoing, incident].map(|direction| {
+                let direction = direction.as_dvec3();
+                direction.truncate().rotate(DVec2::from_angle(angle)).extend(direction.z)
+            });
+            self.reflected(outgoing, incident) + self.reflected(incident, outgoing)
+        };
+        let sum: DVec3 = (0..turns).map(both).sum();
+        (sum / f64::from(turns) / f64::from(outgoing.z + incident.z)).as_vec3()
+    }
+
     /// Light reflected toward `outgoing` of a unit of radiance per steradian from `incident`, f·cosθ, 1/sr:
     /// `outgoing` is the measurement's ω_i, and the cosine is that of `incident`. 0 unless both are above
     /// the surface.
@@ -299,17 +304,17 @@ impl AdaptiveBrdf {
         }
         // Carry both into the part of the circle that was measured.
         let middle = 0.5 * f64::from(self.phi[0] + self.phi[self.phi.len() - 1]);
-        let signed = |d: DVec3, [x, y]: [f64; 2]| dvec3(x * d.x, y * d.y, d.z);
-        let off_middle = |signs: [f64; 2]| {
-            let d = signed(outgoing, signs);
-            ((d.y.atan2(d.x) - middle + PI).rem_euclid(TAU) - PI).abs()
-        };
-        let nearest = |a: &&[f64; 2], b: &&[f64; 2]| off_middle(**a).total_cmp(&off_middle(**b));
-        let signs = self.symmetries.iter().min_by(nearest).copied().unwrap_or([1.0, 1.0]);
-        let (outgoing, incident) = (signed(outgoing, signs), signed(incident, signs));
+        let off_middle = |d: DVec3| (d.y.atan2(d.x) - middle + PI).rem_euclid(TAU) - PI;
+        let carried = self.symmetries.iter().map(|&signs| {
+            let signs = DVec2::from(signs).extend(1.0);
+            (off_middle(signs * outgoing), signs)
+        });
+        let nearest = carried.min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+        let (off_middle, signs) = nearest.unwrap_or((0.0, DVec3::ONE));
+        let (outgoing, incident) = (signs * outgoing, signs * incident);
 
         let angles = |d: DVec3| (d.truncate().length().atan2(d.z), d.y.atan2(d.x));
-        let (theta_i, phi_i) = angles(outgoing);
+        let (theta_i, phi_i) = (angles(outgoing).0, middle + off_middle);
         let (theta_m, phi_m) = angles(outgoing + incident);
         let turn = if self.traits.is_anisotropic { 0.0 } else { phi_i };
         let square =
