@@ -4,6 +4,7 @@
 //! Values are per steradian without the cosine.
 
 mod base;
+mod bilinear;
 pub mod cornell;
 pub mod layout;
 pub mod lookup;

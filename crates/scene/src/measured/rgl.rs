@@ -16,7 +16,12 @@ use glam::{DVec2, DVec3, Quat, Vec3};
 
 use crate::{
     error::{Error, Result},
-    measured::{layout::MEASURED_THETA_HALF_BINS, table::MeasuredTable, tensor::TensorFile},
+    measured::{
+        bilinear::{self, Cell, Density, Grid},
+        layout::MEASURED_THETA_HALF_BINS,
+        table::MeasuredTable,
+        tensor::TensorFile,
+    },
     spectrum,
 };
 
@@ -33,122 +38,14 @@ pub struct Traits {
     pub is_spectral: bool,
 }
 
-/// Values at the nodes of a regular grid over the unit square, bilinear between them.
-struct Grid {
-    values: Vec<f32>,
-    columns: usize,
-    rows: usize,
-}
-
-/// Place in a grid: the node before it, and how far it is from there, 0…1.
-#[derive(Clone, Copy)]
-struct Cell {
-    column: usize,
-    row: usize,
-    x: f64,
-    y: f64,
-}
-
-impl Cell {
-    fn new([x, y]: [f64; 2], columns: usize, rows: usize) -> Self {
-        let along = |position: f64, nodes: usize| {
-            let position = position.clamp(0.0, 1.0) * (nodes - 1) as f64;
-            let node = (position as usize).min(nodes - 2);
-            (node, position - node as f64)
-        };
-        let ((column, x), (row, y)) = (along(x, columns), along(y, rows));
-        Self { column, row, x, y }
-    }
-
-    /// Weights of the four nodes around, those of the next row last.
-    fn weights(self) -> [f64; 4] {
-        let Self { x, y, .. } = self;
-        [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y]
-    }
-
-    /// Indices of the four nodes around.
-    fn nodes(self, columns: usize) -> [usize; 4] {
-        let first = self.row * columns + self.column;
-        [first, first + 1, first + columns, first + columns + 1]
-    }
-}
-
-impl Grid {
-    /// Reads a field of two dimensions, none of its values negative.
-    fn read(file: &TensorFile<'_>, name: &str) -> Result<Self> {
-        let (values, [rows, columns]) = file.floats(name)?;
-        check_grid(file, name, &values, columns, rows)?;
-        Ok(Self { values, columns, rows })
-    }
-
-    fn at(&self, place: [f64; 2]) -> f64 {
-        let cell = Cell::new(place, self.columns, self.rows);
-        let value = |node: usize| f64::from(self.values[node]);
-        cell.nodes(self.columns).map(value).iter().zip(cell.weights()).map(|(v, w)| v * w).sum()
-    }
-}
-
-/// Fails for a grid of fewer than two nodes along an axis, or with a negative value.
-fn check_grid(
-    file: &TensorFile<'_>,
-    name: &str,
-    values: &[f32],
-    columns: usize,
-    rows: usize,
-) -> Result<()> {
-    if columns < 2 || rows < 2 {
-        let message = format!("expected a grid of 2 × 2 or more, found {columns} × {rows}");
-        return Err(file.error(format!("field `{name}`: {message}")));
-    }
-    match values.iter().find(|value| **value < 0.0) {
-        None => Ok(()),
-        Some(value) => {
-            Err(file.error(format!("field `{name}`: expected no negative number, found {value}")))
-        }
-    }
-}
-
-/// Density of normals for one measured direction, of integral 1 over the nodes' unit steps, with its
-/// integrals up to each node.
-struct Slice {
-    density: Vec<f32>,
-    /// Along each row up to a column.
-    along: Vec<f32>,
-    /// Over the rows up to a row.
-    up_to: Vec<f32>,
-}
-
-impl Slice {
-    /// `None` if the density is 0 everywhere.
-    fn new(values: &[f32], columns: usize) -> Option<Self> {
-        let mut along = vec![0.0_f64; values.len()];
-        let mut up_to = vec![0.0_f64; values.len() / columns];
-        for row in 0..up_to.len() {
-            let first = row * columns;
-            for node in first + 1..first + columns {
-                let both = f64::from(values[node - 1]) + f64::from(values[node]);
-                along[node] = along[node - 1] + 0.5 * both;
-            }
-            if row > 0 {
-                let both = along[first - 1] + along[first + columns - 1];
-                up_to[row] = up_to[row - 1] + 0.5 * both;
-            }
-        }
-        let scale = up_to.last().filter(|total| **total > 0.0)?.recip();
-        let scaled = |values: &[f64]| values.iter().map(|value| (value * scale) as f32).collect();
-        let density = values.iter().map(|value| (f64::from(*value) * scale) as f32).collect();
-        Some(Self { density, along: scaled(&along), up_to: scaled(&up_to) })
-    }
-}
-
 /// Measured BRDF as its file interpolates it.
 pub struct AdaptiveBrdf {
     theta: Vec<f32>,
     phi: Vec<f32>,
     ndf: Grid,
     sigma: Grid,
-    /// By φ_i, then θ_i.
-    slices: Vec<Slice>,
+    /// Densities of normals by φ_i, then θ_i.
+    slices: Vec<Density>,
     /// Columns and rows of the slices.
     size: [usize; 2],
     /// Pictures in the order of the slices.
@@ -183,14 +80,18 @@ impl AdaptiveBrdf {
     /// shape or range.
     pub fn read(path: &Path) -> Result<Self> {
         let file = TensorFile::read(path)?;
-        let theta = angles(&file, "theta_i")?;
-        let phi = angles(&file, "phi_i")?;
-        let (ndf, sigma) = (Grid::read(&file, "ndf")?, Grid::read(&file, "sigma")?);
+        let (theta, phi) = (rising(&file, "theta_i")?, rising(&file, "phi_i")?);
+        let grid = |name: &str| {
+            let (values, [rows, columns]) = file.floats(name)?;
+            check_grid(&file, name, &values, [columns, rows])?;
+            Ok(Grid { values, size: [columns, rows] })
+        };
+        let (ndf, sigma) = (grid("ndf")?, grid("sigma")?);
         let (values, [of_phi, of_theta, rows, columns]) = file.floats("vndf")?;
-        check_grid(&file, "vndf", &values, columns, rows)?;
+        check_grid(&file, "vndf", &values, [columns, rows])?;
         check_directions(&file, "vndf", [of_phi, of_theta], [&phi, &theta])?;
         let slices: Option<_> =
-            values.chunks_exact(columns * rows).map(|slice| Slice::new(slice, columns)).collect();
+            values.chunks_exact(columns * rows).map(|slice| Density::new(slice, columns)).collect();
         let slices = slices.ok_or_else(|| {
             file.error("field `vndf`: expected a density above 0 for each direction, found 0")
         })?;
@@ -200,10 +101,9 @@ impl AdaptiveBrdf {
         let (values, [of_phi, of_theta, channels, color_rows, color_columns]) =
             file.floats(name)?;
         check_directions(&file, name, [of_phi, of_theta], [&phi, &theta])?;
-        check_grid(&file, name, &[], color_columns, color_rows)?;
+        check_grid(&file, name, &[], [color_columns, color_rows])?;
         let weights = if is_spectral {
-            let (wavelengths, [_]) = file.floats("wavelengths")?;
-            check_rising(&file, "wavelengths", &wavelengths)?;
+            let wavelengths = rising(&file, "wavelengths")?;
             let wavelengths: Vec<f64> = wavelengths.iter().map(|nm| f64::from(*nm)).collect();
             spectrum::srgb_weights(&wavelengths).ok_or_else(|| {
                 file.error("field `wavelengths`: expected nm, of which some are visible")
@@ -359,12 +259,18 @@ impl AdaptiveBrdf {
                 weight(of_phi, phi_share) * weight(of_theta, theta_share),
             );
         }
+        let slices = slices.into_iter().filter(|slice| slice.1 > 0.0);
+        let mixed = |number: &dyn Fn(&Density) -> f32| -> f64 {
+            let weighted = |(slice, weight)| weight * f64::from(number(&self.slices[slice]));
+            slices.clone().map(weighted).sum()
+        };
+        let random_numbers = bilinear::invert(normal, self.size, mixed);
         let [columns, rows] = self.color_size;
-        let cell = Cell::new(self.random_numbers(normal, &slices), columns, rows);
+        let nodes = Cell::new(random_numbers, self.color_size).nodes(columns);
         let mut color = DVec3::ZERO;
-        for (slice, weight) in slices.into_iter().filter(|slice| slice.1 > 0.0) {
+        for (slice, weight) in slices {
             let picture = &self.colors[slice * columns * rows..][..columns * rows];
-            for (node, share) in cell.nodes(columns).into_iter().zip(cell.weights()) {
+            for (node, share) in nodes {
                 color += weight * share * picture[node].as_dvec3();
             }
         }
@@ -373,33 +279,6 @@ impl AdaptiveBrdf {
         }
         let area = self.sigma.at(square(theta_i, phi_i));
         if area > 0.0 { color * self.ndf.at(normal) / (4.0 * area) } else { DVec3::ZERO }
-    }
-
-    /// Random numbers that the density, mixed of slices by their weights, makes a place of: its share of
-    /// the row there up to the place, and the share of the rows below.
-    fn random_numbers(&self, place: [f64; 2], slices: &[(usize, f64)]) -> [f64; 2] {
-        let [columns, rows] = self.size;
-        let cell = Cell::new(place, columns, rows);
-        let mixed = |value: &dyn Fn(&Slice) -> f32| -> f64 {
-            let used = slices.iter().filter(|slice| slice.1 > 0.0);
-            used.map(|&(slice, weight)| weight * f64::from(value(&self.slices[slice]))).sum()
-        };
-        let mix = |low: f64, high: f64, share: f64| low + share * (high - low);
-        // Integral from a node to a share of the way to the next.
-        let part = |low: f64, high: f64, share: f64| share * mix(low, high, 0.5 * share);
-        let nodes = cell.nodes(columns);
-        let density = nodes.map(|node| mixed(&|slice| slice.density[node]));
-        let ends = [cell.row, cell.row + 1].map(|row| {
-            let last = row * columns + columns - 1;
-            mixed(&|slice| slice.along[last])
-        });
-        let before = |node: usize| mixed(&|slice| slice.along[node]);
-        let low = mix(density[0], density[2], cell.y);
-        let high = mix(density[1], density[3], cell.y);
-        let along = mix(before(nodes[0]), before(nodes[2]), cell.y) + part(low, high, cell.x);
-        let row = mix(ends[0], ends[1], cell.y);
-        let below = mixed(&|slice| slice.up_to[cell.row]) + part(ends[0], ends[1], cell.y);
-        [if row > 0.0 { along / row } else { 0.0 }, below]
     }
 }
 
@@ -412,21 +291,29 @@ fn interval(nodes: &[f32], value: f64) -> (usize, f64) {
     (node, if nodes.len() > 1 { ((value - low) / width).clamp(0.0, 1.0) } else { 0.0 })
 }
 
-/// Rising angles of a field, radians.
-fn angles(file: &TensorFile<'_>, name: &str) -> Result<Vec<f32>> {
+/// Rising numbers of a field.
+fn rising(file: &TensorFile<'_>, name: &str) -> Result<Vec<f32>> {
     let (values, [_]) = file.floats(name)?;
-    check_rising(file, name, &values)?;
-    Ok(values)
-}
-
-fn check_rising(file: &TensorFile<'_>, name: &str, values: &[f32]) -> Result<()> {
     match values.windows(2).find(|pair| pair[0] >= pair[1]) {
-        None => Ok(()),
+        None => Ok(values),
         Some(pair) => {
             let message = format!("expected rising numbers, found {} after {}", pair[1], pair[0]);
             Err(file.error(format!("field `{name}`: {message}")))
         }
     }
+}
+
+/// Fails for a grid of fewer than two nodes along an axis, or with a negative value.
+fn check_grid(file: &TensorFile<'_>, name: &str, values: &[f32], size: [usize; 2]) -> Result<()> {
+    let [columns, rows] = size;
+    let message = if columns < 2 || rows < 2 {
+        format!("expected a grid of 2 × 2 or more, found {columns} × {rows}")
+    } else if let Some(value) = values.iter().find(|value| **value < 0.0) {
+        format!("expected no negative number, found {value}")
+    } else {
+        return Ok(());
+    };
+    Err(file.error(format!("field `{name}`: {message}")))
 }
 
 /// Fails for a field whose first dimensions are not those of the measured directions.
