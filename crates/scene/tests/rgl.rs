@@ -12,10 +12,7 @@ use fenestra_scene::{
     Scene,
     export::{Settings, mitsuba::export},
     material::MaterialKind,
-    measured::{
-        MeasuredTable,
-        rgl::{AdaptiveBrdf, Traits},
-    },
+    measured::{MeasuredTable, RglTraits, rgl::AdaptiveBrdf},
 };
 use glam::{DVec3, dvec3};
 
@@ -119,7 +116,7 @@ fn an_anisotropic_file_is_averaged_with_a_warning() {
     let (_, fields) = brushed();
     let brdf = read(&fields);
     assert!(brdf.warnings()[0].starts_with("anisotropic"), "{:?}", brdf.warnings());
-    assert_eq!(brdf.traits, Traits { is_anisotropic: true, is_spectral: false });
+    assert_eq!(brdf.traits, RglTraits { is_anisotropic: true, is_spectral: false });
     for [theta_i, _, theta_o, phi] in PAIRS {
         let value = |turn: f64| {
             let [wi, wo] = pair([theta_i, turn, theta_o, phi + turn]);
@@ -148,7 +145,7 @@ fn spectra_become_colours() {
     let spectrum = |color: DVec3| green.iter().map(|share| share * color.y).collect();
     let saturated = read(&measured(ggx, &[0.0], Some(&nm), spectrum));
     assert!(saturated.warnings()[0].contains("beyond Rec.709"), "{:?}", saturated.warnings());
-    assert_eq!(saturated.traits, Traits { is_anisotropic: false, is_spectral: true });
+    assert_eq!(saturated.traits, RglTraits { is_anisotropic: false, is_spectral: true });
     let found = saturated.reflected(wi, wo);
     assert!(found.x == 0.0 && found.y > 0.0 && found.z >= 0.0, "{found}");
 
@@ -218,7 +215,7 @@ fn mitsuba_scenes_keep_their_measurements() {
         .collect();
     assert!(tables.len() == 2 && std::ptr::eq(tables[0], tables[1]));
     assert_eq!(tables[0].warnings, [""; 0]);
-    assert_eq!(tables[0].rgl, Some(Traits { is_anisotropic: false, is_spectral: false }));
+    assert_eq!(tables[0].rgl, Some(RglTraits { is_anisotropic: false, is_spectral: false }));
     assert_holds(tables[0], &read(&fields));
     assert!(!scene.materials[0].surface.two_sided && scene.materials[1].surface.two_sided);
     assert!(scene.inputs.iter().any(|input| input.ends_with("gold leaf.tensor")));

@@ -21,7 +21,7 @@ use crate::{
     files,
 };
 
-pub use table::{CELL_COUNT, MeasuredTable, bin_directions, cell_index};
+pub use table::{CELL_COUNT, MeasuredTable, RglTraits, bin_directions, cell_index};
 
 impl MeasuredTable {
     /// Reads a measured BRDF: MERL `.binary` or RGL `.bsdf` if the name or the first 12 bytes say so,

@@ -19,7 +19,7 @@ use crate::{
     measured::{
         bilinear::{self, Cell, Density, Grid},
         layout::MEASURED_THETA_HALF_BINS,
-        table::MeasuredTable,
+        table::{MeasuredTable, RglTraits},
         tensor::TensorFile,
     },
     spectrum,
@@ -28,15 +28,6 @@ use crate::{
 /// Turns over which an anisotropic BRDF is averaged. An odd count visits twice as many where half a turn
 /// changes nothing.
 const TURNS: u32 = 17;
-
-/// Parts of a file that the baked table has no place for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Traits {
-    /// The BRDF depends on the turn of the surface about its normal; the table holds the mean.
-    pub is_anisotropic: bool,
-    /// The file has spectra; the table holds their linear sRGB under D65.
-    pub is_spectral: bool,
-}
 
 /// Measured BRDF as its file interpolates it.
 pub struct AdaptiveBrdf {
@@ -57,7 +48,7 @@ pub struct AdaptiveBrdf {
     /// Signs of x and y that carry directions into the measured part of a symmetric BRDF.
     symmetries: &'static [[f64; 2]],
     /// Parts that the table has no place for.
-    pub traits: Traits,
+    pub traits: RglTraits,
     clipped_count: usize,
 }
 
@@ -156,7 +147,7 @@ impl AdaptiveBrdf {
             color_size: [color_columns, color_rows],
             is_relative: file.flag("jacobian")?,
             symmetries,
-            traits: Traits { is_anisotropic, is_spectral },
+            traits: RglTraits { is_anisotropic, is_spectral },
             clipped_count,
         })
     }

@@ -13,7 +13,7 @@ use crate::{
         triple,
     },
     material::{ConductorFresnel, MaterialKind},
-    measured::rgl::Traits,
+    measured::RglTraits,
     texture::TextureUse,
 };
 
@@ -174,7 +174,7 @@ impl Translator<'_> {
     }
 
     /// Copy of an RGL file, which Mitsuba reads.
-    fn measured(&mut self, path: &Path, traits: Traits) -> String {
+    fn measured(&mut self, path: &Path, traits: RglTraits) -> String {
         let file = path.display();
         if traits.is_anisotropic {
             self.subject.warn(&format!(
