@@ -100,6 +100,8 @@
 //! - \[Duff et al. 2017\] "Building an Orthonormal Basis, Revisited", JCGT 6(1).
 //! - \[Dupuy & Benyoub 2023\] "Sampling Visible GGX Normals with Spherical Caps", Computer
 //!   Graphics Forum 42(8).
+//! - \[Dupuy & Jakob 2018\] "An Adaptive Parameterization for Efficient Material Acquisition and
+//!   Rendering", ACM Transactions on Graphics 37(6).
 //! - \[Eto & Tokuyoshi 2023\] "Bounded VNDF Sampling for Smith–GGX Reflections", SIGGRAPH Asia
 //!   Technical Communications.
 //! - \[Friedman & Jones 2015\] "Fully Automatic ID Mattes with Support for Motion Blur and

@@ -297,6 +297,13 @@ fn a_missing_or_truncated_brdf_is_named() {
     assert_refused(&folder, &parts);
     folder.write("paint.binary", header([90, 90, 360]));
     assert_refused(&folder, &["paint.binary: ", "90 × 90 × 180", "90 × 90 × 360"]);
+    let folder = measured("paint.bsdf");
+    folder.write("paint.bsdf", "tensor_file\0\x01\0\x09\0\0\0");
+    let parts = ["error: paint.bsdf: truncated: its header goes on after byte 18"];
+    assert_refused(&folder, &parts);
+    for command in [&["info"][..], &["fit", "brdf"]] {
+        folder.run(&[command, &["paint.bsdf"]].concat()).assert(1, &parts);
+    }
     let folder = measured("paint.brdf");
     folder.write("paint.brdf", "3 450 550 650\n0.1 0 0.1 3.1 0.2 0.2\n");
     assert_refused(&folder, &["error: paint.brdf:2:", "records of 7 numbers", "6 left over"]);

@@ -12,7 +12,7 @@ use fenestra::{
         export::{Settings, mitsuba::export},
         lamp::LampKind,
         material::MaterialKind,
-        measured::MeasuredTable,
+        measured::{MeasuredTable, RglTraits},
         texture::TextureUse,
     },
     surface::TextureTables,
@@ -206,13 +206,24 @@ fn measured_materials_become_diffuse_with_their_albedo() {
     let table = MeasuredTable::tabulate(|_, _| reflectance / PI).unwrap();
     let path = "paint.binary".into();
     scene.materials[0].kind = MaterialKind::Measured { path, table: Arc::new(table) };
-    let exported = export(&scene, Path::new("a.xml"), SETTINGS);
-    let [warning] = &exported.warnings[..] else { unreachable!("one warning") };
+    let warnings = export(&scene, Path::new("a.xml"), SETTINGS).warnings.clone();
+    let [warning] = &warnings[..] else { unreachable!("one warning") };
     let found = warning.rsplit_once("reflectance ").unwrap().1;
     let found: Vec<f32> = found.split(", ").map(|number| number.parse().unwrap()).collect();
     let error = (Vec3::from_slice(&found) - reflectance).abs() / reflectance;
     assert!(warning.contains("`clay`") && warning.contains("paint.binary"), "{warning}");
     assert!(error.max_element() < 0.01, "{warning}");
+
+    // A file that Mitsuba reads goes as it is, with its differences named.
+    let mut table = MeasuredTable::tabulate(|_, _| reflectance / PI).unwrap();
+    table.rgl = Some(RglTraits { is_anisotropic: true, is_spectral: true });
+    let path = "foil.bsdf".into();
+    scene.materials[0].kind = MaterialKind::Measured { path, table: Arc::new(table) };
+    let [turns, spectra] = &export(&scene, Path::new("a.xml"), SETTINGS).warnings[..] else {
+        unreachable!("two warnings")
+    };
+    assert!(turns.contains("foil.bsdf is anisotropic in Mitsuba"), "{turns}");
+    assert!(spectra.contains("only Mitsuba's spectral variants read"), "{spectra}");
 }
 
 /// Writes an image of 2 × 2 texels and a square with texture coordinates.

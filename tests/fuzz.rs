@@ -90,6 +90,7 @@ fn guide() -> Vec<u8> {
         arm: Some(Arm {
             is_guided: true,
             guides_bounces: true,
+            guides_later: true,
             shares_paths: false,
             candidates: 8,
             rays: [8, 2],

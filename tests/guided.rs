@@ -35,7 +35,9 @@ const FIRST_SEED: u32 = 7000;
 
 fn guided(candidates: u32) -> Settings {
     let parameters = Parameters { candidates: Some(candidates), ..Parameters::default() };
-    Settings { sampler: Sampler::Guided, parameters, ..Settings::default() }
+    // Few paths end: judgements need little noise.
+    let roulette = Roulette { vertex: 2, throughput: 0.02 };
+    Settings { sampler: Sampler::Guided, parameters, roulette, ..Settings::default() }
 }
 
 /// Shows a scene on a film of four blocks.

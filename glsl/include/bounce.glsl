@@ -17,7 +17,7 @@ UPDATES(paths)
 // First vertex at which russian roulette may end a path.
 layout(constant_id = CONSTANT_ROULETTE_VERTEX) const uint ROULETTE_VERTEX = 2u;
 // Throughput below which it does: the light that such a path still brings is worth less than its time.
-layout(constant_id = CONSTANT_ROULETTE_THROUGHPUT) const float ROULETTE_THROUGHPUT = 0.02;
+layout(constant_id = CONSTANT_ROULETTE_THROUGHPUT) const float ROULETTE_THROUGHPUT = 0.1;
 
 // Random numbers for a direction of the BRDF: those of sample `number`.
 vec3 bounce_numbers(PathIndex index, uint number, uint seed) {

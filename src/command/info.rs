@@ -21,7 +21,7 @@ use crate::{
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// Scene (.toml, .gltf, .glb, .obj, .pbrt, .xml), image (.exr), environment map (.hdr, .pfm; .exr with
-    /// --map), measured BRDF (.binary, .brdf) or fit (.fit).
+    /// --map), measured BRDF (.binary, .brdf, .bsdf) or fit (.fit).
     pub file: Option<PathBuf>,
     /// Read an .exr file as an environment map.
     #[arg(long, requires = "file")]
@@ -54,14 +54,14 @@ fn file(path: &Path, is_map: bool) -> Result<Description> {
         "hdr" | "pfm" => environment_map(path),
         "exr" if is_map => environment_map(path),
         "exr" => image(path),
-        "binary" | "brdf" => measured_brdf(path),
+        "binary" | "brdf" | "bsdf" => measured_brdf(path),
         fit::cache::EXTENSION => fit::describe(path),
         _ => {
             // Report a missing file before an unknown kind.
             fs::metadata(path).map_err(|source| Error::io(path, "read", source))?;
             Err(Error::format(
                 path,
-                "unknown kind of file; expected .toml, .exr, .hdr, .pfm, .binary, .brdf or .fit",
+                "unknown kind of file; expected .toml, .exr, .hdr, .pfm, .binary, .brdf, .bsdf or .fit",
             ))
         }
     }

@@ -117,8 +117,6 @@ struct Order<'a> {
     settings: &'a PassSettings,
     steps: &'a dyn Steps,
     sharing: Option<Sharing>,
-    /// Specialization of the pass `gather`, as in [`Steps::escape`].
-    escape: Option<Vec<(u32, u32)>>,
     vertices: u32,
     /// First vertex with a list of living paths.
     first_listed: u32,
@@ -137,7 +135,6 @@ impl<'a> Order<'a> {
             settings,
             steps,
             sharing: shares.then_some(sharing),
-            escape: steps.escape(),
             vertices,
             // Cohorts keep the second vertices of all paths.
             first_listed: if walks_lists { 1 + u32::from(shares) } else { u32::MAX },
@@ -203,7 +200,7 @@ impl<'a> Order<'a> {
             shadow_ray_count: 0,
             ..self.wave
         };
-        let is_counted = self.escape.is_some() && rays > 0;
+        let is_counted = rays > 0 && self.steps.escape(vertex).is_some();
         self.wave.bounce_rays = u32::from(is_counted && (!self.is_last_vertex() || self.emits()));
     }
 
@@ -278,8 +275,9 @@ impl<'a> Order<'a> {
     }
 
     fn gather(&mut self, wave: Wave) {
-        let escape = self.escape.as_deref().filter(|_| wave.to_lamps == 0).unwrap_or_default();
-        self.add_with(Kernel::new("gather", Domain::Arrivals, escape), wave);
+        let escape = self.steps.escape(wave.vertex).filter(|_| wave.to_lamps == 0);
+        let escape = escape.unwrap_or_default();
+        self.add_with(Kernel::new("gather", Domain::Arrivals, &escape), wave);
         self.share(Moment::Gathered, wave);
     }
 

@@ -16,7 +16,7 @@ pub struct Roulette {
 
 impl Default for Roulette {
     fn default() -> Self {
-        Self { vertex: 2, throughput: 0.02 }
+        Self { vertex: 2, throughput: 0.1 }
     }
 }
 

@@ -52,9 +52,9 @@ pub trait Steps {
         Vec::new()
     }
 
-    /// Specialization of the pass `gather`, if bounce rays that escape are samples of the environment
-    /// beside the shadow rays of their vertex.
-    fn escape(&self) -> Option<Vec<(u32, u32)>> {
+    /// Specialization of the pass `gather` from this vertex on, if bounce rays that leave it and escape are
+    /// samples of the environment beside its shadow rays. A vertex after one with `Some` has the same.
+    fn escape(&self, _vertex: u32) -> Option<Vec<(u32, u32)>> {
         None
     }
 

@@ -87,7 +87,7 @@ impl Steps for RaySteps {
         self.learn.iter().cloned().collect()
     }
 
-    fn escape(&self) -> Option<Vec<(u32, u32)>> {
+    fn escape(&self, _vertex: u32) -> Option<Vec<(u32, u32)>> {
         self.escape.clone()
     }
 }

@@ -10,7 +10,7 @@ use std::{fs, path::Path};
 
 use fenestra_scene::{
     EnvironmentMap, Scene,
-    measured::{MeasuredTable, cornell},
+    measured::{MeasuredTable, cornell, rgl::AdaptiveBrdf},
     mesh::Mesh,
     picture::Image,
     texture::Texture,
@@ -19,7 +19,7 @@ use image::ImageFormat;
 
 use crate::support::{
     fuzz::{self, Target},
-    gltf, seeds,
+    gltf, seeds, tensor,
 };
 
 fn scene(path: &Path, _: &[u8]) -> bool {
@@ -120,6 +120,9 @@ fn targets() -> Vec<Target> {
         }),
         target("cornell-table", "input.brdf", texts(&[seeds::CORNELL]), |path, _| {
             MeasuredTable::load(path).is_ok()
+        }),
+        target("rgl", "input.bsdf", vec![tensor::encode(&tensor::isotropic(0.4).1)], |path, _| {
+            AdaptiveBrdf::read(path).is_ok()
         }),
         target("hdr", "input.hdr", vec![seeds::hdr(false), seeds::hdr(true)], map),
         target("pfm", "input.pfm", vec![seeds::pfm()], map),

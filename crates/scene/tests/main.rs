@@ -12,6 +12,7 @@ mod instances_in_files;
 mod mesh_materials;
 mod mitsuba;
 mod pbrt;
+mod rgl;
 mod scene;
 mod shapes;
 mod spectra;

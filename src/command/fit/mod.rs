@@ -76,7 +76,7 @@ pub struct EnvironmentArguments {
 /// Arguments of `fit brdf`.
 #[derive(Debug, clap::Args)]
 pub struct BrdfArguments {
-    /// Measured BRDF (.binary, .brdf), material of a scene (SCENE.toml#name), or TYPE:key=value,…
+    /// Measured BRDF (.binary, .brdf, .bsdf), material of a scene (SCENE.toml#name), or TYPE:key=value,…
     /// with the keys of a scene's material, such as plastic:diffuse=0.5,alpha=0.1 or
     /// conductor:reflectance=[0.9,0.6,0.3],alpha=0.05.
     pub material: String,

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Extensions of measured BRDFs.
-const MEASURED: [&str; 2] = ["binary", "brdf"];
+const MEASURED: [&str; 3] = ["binary", "brdf", "bsdf"];
 /// Material types that can be given inline.
 const TYPES: [&str; 5] = ["diffuse", "plastic", "conductor", "principled", "measured"];
 /// Minimal scene around an inline material.
@@ -94,8 +94,8 @@ pub(super) fn material(text: &str) -> Result<Source> {
         return Ok(Source { name: stem(path), tables, inputs: vec![path.into()] });
     }
     Err(Error::usage(format!(
-        "`{text}` is no BRDF; expected a .binary or .brdf file, SCENE.toml#material, or \
-         TYPE:key=value,… with the type {}",
+        "`{text}` is no BRDF; expected a .binary, .brdf or .bsdf file, SCENE.toml#material, \
+         or TYPE:key=value,… with the type {}",
         TYPES.join(", ")
     )))
 }

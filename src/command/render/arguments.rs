@@ -71,7 +71,7 @@ pub struct Arguments {
     pub roulette_depth: Option<u32>,
     /// Share of the camera's light that a path still carries, below which Russian roulette may end it; 0 for
     /// never.
-    #[arg(long, value_name = "T", default_value_t = 0.02, help_heading = SAMPLING, hide_short_help = true)]
+    #[arg(long, value_name = "T", default_value_t = 0.1, help_heading = SAMPLING, hide_short_help = true)]
     pub roulette_throughput: f32,
     /// Random seed.
     #[arg(long, default_value_t = 0, help_heading = SAMPLING, hide_short_help = true)]

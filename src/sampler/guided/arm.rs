@@ -21,6 +21,8 @@ pub struct Arm {
     pub is_guided: bool,
     /// True if bounces follow the light that cells expect.
     pub guides_bounces: bool,
+    /// True if shadow rays of later vertices are guided too; bounces are guided only then.
+    pub guides_later: bool,
     /// True if the pixels of a cohort share paths.
     pub shares_paths: bool,
     /// Candidates for each shadow ray, if it is guided.
@@ -35,6 +37,7 @@ impl Arm {
     /// True if every number is one that a render can have chosen.
     pub(super) fn is_possible(&self) -> bool {
         GUIDED_CANDIDATES.contains(&self.candidates)
+            && (self.guides_later || !self.guides_bounces)
             && self.rays.iter().all(|rays| *rays <= 4096)
             && self.roulette_throughput >= 0.0
             && self.roulette_throughput.is_finite()
@@ -78,24 +81,21 @@ impl Arm {
     pub(super) fn time(&self, work: Work) -> f64 {
         let [first, later] = self.rays.map(f64::from);
         let (rays, shadow_rays) = (work.rays / work.paths, work.shadow_rays / work.paths);
-        let directions = first + (rays - 1.0) * later;
-        let direction = if self.is_guided {
+        let direction = |is_guided| {
             let [one, more] = PRICES.guided_candidates;
-            one + more * f64::from(self.candidates - 1)
-        } else {
-            PRICES.direction
+            let guided = one + more * f64::from(self.candidates - 1);
+            if is_guided { guided } else { PRICES.direction }
         };
+        let directions = first * direction(self.is_guided)
+            + (rays - 1.0) * later * direction(self.is_guided && self.guides_later);
         let bounce = if self.guides_bounces { PRICES.guided_bounce } else { 0.0 };
         let cohort = if self.shares_paths { PRICES.cohort } else { 0.0 };
-        rays * (PRICES.ray + bounce)
-            + shadow_rays * PRICES.shadow_ray
-            + directions * direction
-            + cohort
+        rays * (PRICES.ray + bounce) + shadow_rays * PRICES.shadow_ray + directions + cohort
     }
 }
 
 impl fmt::Display for Arm {
-    /// Formats "guided, 8 + 2 rays, guided bounces, 4 candidates, shared paths, roulette below 0.02".
+    /// Formats "guided, 8 + 2 rays, later ones as mis, 4 candidates, shared paths, roulette below 0.02".
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [first, later] = self.rays;
         write!(
@@ -103,6 +103,9 @@ impl fmt::Display for Arm {
             "{}, {first} + {later} rays",
             if self.is_guided { "guided" } else { "mis" }
         )?;
+        if self.is_guided && !self.guides_later {
+            write!(formatter, ", later ones as mis")?;
+        }
         if self.is_guided && self.guides_bounces {
             write!(formatter, ", guided bounces")?;
         }
@@ -121,12 +124,10 @@ impl fmt::Display for Arm {
 pub(super) enum Axes {
     /// How directions are chosen.
     Technique,
-    /// How paths bounce, and whether they are shared.
+    /// How paths go on after the first vertex.
     Paths,
     /// Half and twice as many shadow rays.
     Rays,
-    /// Where paths may end.
-    Roulette,
     /// Both at once.
     Techniques,
     /// Every arm that differs by one setting.
@@ -143,6 +144,7 @@ pub(super) struct Arms {
     /// False where the candidates are given, so that directions are guided.
     chooses_technique: bool,
     chooses_bounces: bool,
+    chooses_later: bool,
     chooses_sharing: bool,
     chooses_rays: bool,
     chooses_roulette: bool,
@@ -161,6 +163,7 @@ impl Arms {
         let first = Arm {
             is_guided: true,
             guides_bounces,
+            guides_later: true,
             shares_paths: shares_paths && (most > 0 || !chooses_sharing),
             candidates,
             rays: [most, own.later_rays_of(most)],
@@ -169,6 +172,7 @@ impl Arms {
         let open = Arm {
             is_guided: false,
             guides_bounces: false,
+            guides_later: false,
             // Most paths leave an open scene before others can use them.
             shares_paths: shares_paths && !chooses_sharing,
             rays: own.rays_in_the_open(most, settings.depth),
@@ -183,6 +187,7 @@ impl Arms {
             first: [first, open],
             chooses_technique,
             chooses_bounces: chooses_technique && guides_bounces && !has_own_bounces,
+            chooses_later: chooses_technique && has_paths && !(guides_bounces && has_own_bounces),
             chooses_sharing: chooses_sharing && most > 0,
             chooses_rays: chooses_technique
                 && has_paths
@@ -203,10 +208,11 @@ impl Arms {
     pub(super) fn steps(&self, arm: &Arm) -> Box<dyn Steps> {
         let roulette = Roulette { throughput: arm.roulette_throughput, ..self.roulette };
         if arm.is_guided {
-            let steps = self.guided.with_candidates(arm.candidates).with_sharing(arm.shares_paths);
-            Box::new(
-                steps.with_rays(arm.rays).with_bounces(arm.guides_bounces).with_roulette(roulette),
-            )
+            let steps = self.guided.clone().with_candidates(arm.candidates);
+            let steps = steps.with_sharing(arm.shares_paths).with_rays(arm.rays);
+            let steps = steps.with_bounces(arm.guides_bounces).with_roulette(roulette);
+            let is_mixed = !arm.guides_later;
+            Box::new(if is_mixed { steps.with_later(self.mis.clone()) } else { steps })
         } else {
             let steps = self.mis.clone().with_rays(arm.rays).with_sharing(arm.shares_paths);
             Box::new(steps.with_roulette(roulette))
@@ -221,6 +227,9 @@ impl Arms {
         }
         if self.chooses_bounces && taken.is_guided {
             taken.guides_bounces = arm.guides_bounces;
+        }
+        if self.chooses_later && taken.is_guided {
+            taken.guides_later = arm.guides_later || taken.guides_bounces;
         }
         if self.chooses_sharing {
             taken.shares_paths = arm.shares_paths;
@@ -243,15 +252,14 @@ impl Arms {
         }
         if decides(&[Axes::Paths, Axes::Techniques]) {
             all.extend(self.other_bounces(arm));
+            all.extend(self.other_later(arm));
             all.extend(self.other_sharing(arm));
         }
         if decides(&[Axes::Rays]) {
             all.extend(self.other_rays(arm));
         }
-        if decides(&[Axes::Roulette]) {
-            all.extend(self.other_roulette(arm));
-        }
         if decides(&[]) {
+            all.extend(self.other_roulette(arm));
             all.extend(self.other_candidates(arm));
         }
         all
@@ -265,7 +273,12 @@ impl Arms {
 
     fn other_bounces(&self, arm: Arm) -> Option<Arm> {
         let is_free = arm.is_guided && self.chooses_bounces;
-        is_free.then_some(Arm { guides_bounces: !arm.guides_bounces, ..arm })
+        is_free.then_some(Arm { guides_bounces: !arm.guides_bounces, guides_later: true, ..arm })
+    }
+
+    fn other_later(&self, arm: Arm) -> Option<Arm> {
+        let is_free = arm.is_guided && self.chooses_later;
+        is_free.then_some(Arm { guides_bounces: false, guides_later: !arm.guides_later, ..arm })
     }
 
     fn other_sharing(&self, arm: Arm) -> Option<Arm> {

@@ -26,13 +26,12 @@ use crate::{
 
 /// Races of a render: the samples per pixel from which each is due, what it decides, and among how many arms.
 /// The last comes again whenever the film has four times as many samples.
-const RACES: [(u32, Axes, u64); 6] = [
+const RACES: [(u32, Axes, u64); 5] = [
     (0, Axes::Technique, 2),
-    (2, Axes::Paths, 3),
+    (2, Axes::Paths, 4),
     (2, Axes::Rays, 3),
-    (4, Axes::Roulette, 2),
-    (16, Axes::Techniques, 4),
-    (64, Axes::Everything, 8),
+    (16, Axes::Techniques, 5),
+    (64, Axes::Everything, 9),
 ];
 /// Paths of the film for each that races after the first measure, if they take all rounds.
 const FILM_PATHS: u64 = 8;
@@ -251,8 +250,8 @@ mod tests {
 
     #[test]
     fn races_become_rare() {
-        let due = |pixels| (0..9).map(|race| race_due(race, pixels).0).collect::<Vec<u32>>();
-        assert_eq!(due(1 << 20), [0, 2, 2, 4, 16, 64, 256, 1024, 4096]);
+        let due = |pixels| (0..8).map(|race| race_due(race, pixels).0).collect::<Vec<u32>>();
+        assert_eq!(due(1 << 20), [0, 2, 2, 16, 64, 256, 1024, 4096]);
         assert_eq!(race_due(40, 1 << 20).0, u32::MAX);
         // An eighth of the pixels, four samples each, three arms, four rounds: as much as 48 samples allow;
         // the guide is next rebuilt after 64.

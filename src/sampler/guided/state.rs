@@ -24,7 +24,7 @@ use crate::{
 
 const COUNT_WORDS: usize = GUIDE_COUNT_WORDS as usize;
 const FORMAT: &str = "fenestra-guide";
-const VERSION: u32 = 14;
+const VERSION: u32 = 15;
 /// Upper bound of the rays of one cell and direction: each rebuild halves them and adds a word.
 const MAX_ARRIVAL_RAYS: f32 = 1e10;
 /// Upper bound of their light, such that its product with the rays of all cells stays finite.
@@ -313,6 +313,7 @@ mod tests {
         Arm {
             is_guided: true,
             guides_bounces: false,
+            guides_later: true,
             shares_paths: true,
             candidates: 8,
             rays: [4, 1],
@@ -399,6 +400,7 @@ mod tests {
         for wrong in [
             Arm { candidates: 3, ..arm() },
             Arm { rays: [4097, 1], ..arm() },
+            Arm { guides_bounces: true, guides_later: false, ..arm() },
             Arm { roulette_throughput: -1.0, ..arm() },
         ] {
             let message = forged(&|header| header.arm = Some(wrong));

@@ -4,6 +4,7 @@
 use super::parameters::GuidedParameters;
 use crate::{
     pass::{Domain, Kernel, PassSettings, Roulette, Steps, Surfaces},
+    sampler::rays::RaySteps,
     shader::{
         constants::{AOV_GUIDE_CELL, CONSTANT_CANDIDATES},
         rooms::guided::{
@@ -15,7 +16,7 @@ use crate::{
 };
 
 /// Steps of `guided`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GuidedSteps {
     /// Candidates per shadow ray, a quarter of them from the BRDF; 1 is the one-sample model.
     pub candidates: u32,
@@ -24,6 +25,8 @@ pub struct GuidedSteps {
     rays: [u32; 2],
     bounce_candidates: u32,
     guides_bounces: bool,
+    /// Steps of later vertices, if those are not guided.
+    later: Option<RaySteps>,
     surfaces: Surfaces,
     roulette: Roulette,
 }
@@ -37,6 +40,7 @@ impl GuidedSteps {
             rays: [settings.shadow_rays, parameters.later_rays_of(settings.shadow_rays)],
             bounce_candidates: parameters.bounce_candidates,
             guides_bounces: parameters.guides_bounces(settings.depth),
+            later: None,
             surfaces: settings.surfaces,
             roulette: settings.roulette,
         }
@@ -55,6 +59,17 @@ impl GuidedSteps {
     /// Returns the same steps with guided bounces, or those of the BRDF.
     pub(super) fn with_bounces(self, guides_bounces: bool) -> Self {
         Self { guides_bounces, ..self }
+    }
+
+    /// Returns the same steps with those of later vertices, and with bounces of the BRDF: those learn from
+    /// the cells of later vertices.
+    pub(super) fn with_later(self, later: RaySteps) -> Self {
+        Self { later: Some(later), guides_bounces: false, ..self }
+    }
+
+    /// Returns the steps of a vertex that is not guided.
+    fn unguided(&self, vertex: u32) -> Option<&RaySteps> {
+        self.later.as_ref().filter(|_| vertex > 0)
     }
 
     /// Returns the same steps with another roulette.
@@ -86,6 +101,9 @@ impl Steps for GuidedSteps {
     }
 
     fn sample(&self, wave: &Wave) -> Vec<Kernel> {
+        if let Some(later) = self.unguided(wave.vertex) {
+            return later.sample(wave);
+        }
         let own = [
             (CONSTANT_CANDIDATES, self.candidates),
             (CONSTANT_BRDF_CANDIDATES, (self.candidates / 4).max(1)),
@@ -100,13 +118,18 @@ impl Steps for GuidedSteps {
     }
 
     fn after_shadow_rays(&self, wave: &Wave) -> Vec<Kernel> {
-        let learn = teaches(wave).then(|| Kernel::new("learn", Domain::ShadowRays, &[]));
+        let learns = teaches(wave) && self.unguided(wave.vertex).is_none();
+        let learn = learns.then(|| Kernel::new("learn", Domain::ShadowRays, &[]));
         learn.into_iter().collect()
     }
 
     fn finish(&self, wave: &Wave) -> Vec<Kernel> {
         let is_shown = wave.vertex == 0 && wave.aovs & AOV_GUIDE_CELL != 0 && wave.is_training == 0;
         is_shown.then(|| Kernel::new("show_cells", Domain::Pixels, &[])).into_iter().collect()
+    }
+
+    fn escape(&self, vertex: u32) -> Option<Vec<(u32, u32)>> {
+        self.unguided(vertex)?.escape(vertex)
     }
 
     fn bounce(&self, _wave: &Wave) -> Option<Kernel> {

@@ -48,6 +48,13 @@ pub struct Region {
     pub first_entry: usize,
 }
 
+impl Region {
+    fn rectangle(&self) -> Rectangle {
+        let [first, size] = [self.first, self.size].map(|pair| pair.map(|value| value as usize));
+        Rectangle { first, size, parent: self.parent }
+    }
+}
+
 /// A map split into regions.
 #[derive(Clone, Debug)]
 pub struct Partition {
@@ -100,7 +107,7 @@ impl Partition {
         });
         let aliases = self
             .entries
-            .iter()
+            .par_iter()
             .map(|entry| [u32::try_from(entry.threshold).unwrap_or(u32::MAX), entry.alias]);
         (regions.collect(), aliases.collect())
     }
@@ -150,19 +157,21 @@ impl Partition {
     /// Finds, for every region of this partition, the regions of `other`, of the same map, that it
     /// overlaps, with the share of its energy in each.
     pub fn shares_in(&self, other: &Self) -> Vec<Vec<(usize, f64)>> {
-        let count = other.regions.len();
-        let mut energy = vec![0.0; self.regions.len() * count];
-        for ((own, others), cell) in
-            self.region_of_cell.iter().zip(&other.region_of_cell).zip(&self.cells.energy)
-        {
-            energy[usize::from(*own) * count + usize::from(*others)] += cell;
-        }
-        let shares = |row: &[f64]| {
-            let whole: f64 = row.iter().sum();
-            let parts = row.iter().enumerate().filter(|(_, part)| **part > 0.0);
+        let width = self.cells.width;
+        let shares = |region: &Region| {
+            let mut energy = vec![0.0; other.regions.len()];
+            let rectangle = region.rectangle();
+            for cells in rectangle.rows().map(|row| rectangle.cells(row, width)) {
+                let others = &other.region_of_cell[cells.clone()];
+                for (other, cell) in others.iter().zip(&self.cells.energy[cells]) {
+                    energy[usize::from(*other)] += cell;
+                }
+            }
+            let whole: f64 = energy.iter().sum();
+            let parts = energy.into_iter().enumerate().filter(|(_, part)| *part > 0.0);
             parts.map(|(region, part)| (region, part / whole)).collect()
         };
-        energy.chunks(count).map(shares).collect()
+        self.regions.par_iter().map(shares).collect()
     }
 
     fn assemble(cells: Arc<MapCells>, rectangles: &[Rectangle]) -> Self {

@@ -4,6 +4,7 @@
 use std::{collections::BinaryHeap, ops::Range};
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::{
     math::{colour::luminance, refinement::Queued},
@@ -94,18 +95,23 @@ pub struct SummedAreas<'a> {
 
 impl<'a> SummedAreas<'a> {
     /// Sums over `cells`, each multiplied by the `weight` of its index.
-    pub fn new(cells: &'a MapCells, weight: impl Fn(usize) -> f64) -> Self {
+    pub fn new(cells: &'a MapCells, weight: impl Fn(usize) -> f64 + Sync) -> Self {
         let (width, rows) = (cells.width, cells.rows);
         let mut sums = vec![[0.0; 2]; (width + 1) * (rows + 1)];
-        for row in 0..rows {
+        let (_, below) = sums.split_at_mut(width + 1);
+        below.par_chunks_mut(width + 1).enumerate().for_each(|(row, sums)| {
             let mut running = [0.0; 2];
-            for column in 0..width {
+            for (column, sum) in sums[1..].iter_mut().enumerate() {
                 let weight = weight(row * width + column);
                 running[0] += weight * cells.energy[row * width + column];
                 running[1] += weight * cells.row_angle[row];
-                let above = sums[row * (width + 1) + column + 1];
-                sums[(row + 1) * (width + 1) + column + 1] =
-                    [above[0] + running[0], above[1] + running[1]];
+                *sum = running;
+            }
+        });
+        for row in 1..rows {
+            let (above, sums) = sums.split_at_mut((row + 1) * (width + 1));
+            for (sum, above) in sums.iter_mut().zip(&above[row * (width + 1)..]).take(width + 1) {
+                *sum = [above[0] + sum[0], above[1] + sum[1]];
             }
         }
         Self { cells, sums }

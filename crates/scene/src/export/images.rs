@@ -1,7 +1,11 @@
 //! Images of textures, as PNG where the texels go unchanged, else as OpenEXR with the factors of the
 //! material in the texels: formats whose textures have none share it.
 
-use std::{path::Path, sync::Arc};
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use glam::{Vec2, Vec3};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
@@ -47,10 +51,11 @@ struct Picture {
     recipe: Recipe,
 }
 
-/// Images of a scene, each once.
+/// Images of a scene, and files that go unchanged, each once.
 #[derive(Debug, Default)]
 pub(super) struct Pictures {
     list: Vec<Picture>,
+    copies: Vec<PathBuf>,
 }
 
 /// Name and look-up of an exported image.
@@ -89,11 +94,25 @@ impl Pictures {
         self.list[index].bitmap(index)
     }
 
-    /// Writes all images into a folder.
+    /// Adds a file that goes unchanged; returns its name in the folder of the scene.
+    pub(super) fn copy(&mut self, path: &Path) -> String {
+        let index = self.copies.iter().position(|other| other == path).unwrap_or_else(|| {
+            self.copies.push(path.to_owned());
+            self.copies.len() - 1
+        });
+        copied_name(index, path)
+    }
+
+    /// Writes all images and copies into a folder.
     ///
     /// # Errors
-    /// [`crate::Error::Io`] for a file that cannot be written.
+    /// [`crate::Error::Io`] for a file that cannot be read or written.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
+        for (index, path) in self.copies.iter().enumerate() {
+            let bytes = files::read(path)?;
+            let target = folder.join(copied_name(index, path));
+            files::write_atomically(&target, |file| file.write_all(&bytes))?;
+        }
         self.list.iter().enumerate().try_for_each(|(index, picture)| {
             let path = folder.join(picture.bitmap(index).name);
             match picture.stored() {
@@ -105,6 +124,12 @@ impl Pictures {
             }
         })
     }
+}
+
+/// Name of a copied file, an RGL measurement.
+fn copied_name(index: usize, path: &Path) -> String {
+    let stem = safe_name(&path.file_stem().unwrap_or_default().to_string_lossy());
+    format!("f{index:02}_{stem}.bsdf")
 }
 
 impl Picture {

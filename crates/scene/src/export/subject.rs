@@ -62,9 +62,9 @@ impl<'a> Subject<'a> {
     pub(super) fn measured(&mut self, path: &Path, table: &MeasuredTable) -> Vec3 {
         let share = reflected_share(table);
         self.warn(&format!(
-            "{} reads no table such as {}; written as diffuse with the reflectance {}",
-            self.program,
+            "{} is not written for {}; written as diffuse with the reflectance {}",
             path.display(),
+            self.program,
             triple(share)
         ));
         share

@@ -178,7 +178,7 @@ pub(crate) struct ThinDielectricEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MeasuredEntry {
-    /// MERL or Cornell file.
+    /// MERL, Cornell or RGL file.
     pub file: PathBuf,
 }
 

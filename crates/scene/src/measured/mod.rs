@@ -1,15 +1,18 @@
-//! Measured BRDFs: MERL and Cornell files → [`MeasuredTable`], which evaluates and samples them.
+//! Measured BRDFs: MERL, Cornell and RGL files → [`MeasuredTable`], which evaluates and samples them.
 //!
 //! Directions are unit vectors in the shading frame (z is the normal) and point away from the surface.
 //! Values are per steradian without the cosine.
 
 mod base;
+mod bilinear;
 pub mod cornell;
 pub mod layout;
 pub mod lookup;
 pub mod merl;
+pub mod rgl;
 mod table;
 mod tabulate;
+mod tensor;
 
 use std::{io::Read, path::Path};
 
@@ -18,16 +21,19 @@ use crate::{
     files,
 };
 
-pub use table::{CELL_COUNT, MeasuredTable, bin_directions, cell_index};
+pub use table::{CELL_COUNT, MeasuredTable, RglTraits, bin_directions, cell_index};
 
 impl MeasuredTable {
-    /// Reads a measured BRDF: MERL `.binary` if the name or the first 12 bytes say so, else the
-    /// text format of Cornell and pbrt-v2.
+    /// Reads a measured BRDF: MERL `.binary` or RGL `.bsdf` if the name or the first 12 bytes say so,
+    /// else the text format of Cornell and pbrt-v2.
     pub fn load(path: &Path) -> Result<Self> {
         let mut head = [0; merl::HEADER_BYTES];
         let read = files::open_regular(path)?
             .read(&mut head)
             .map_err(|source| Error::io(path, "read", source))?;
+        if head == tensor::MAGIC || files::extension(path) == "bsdf" {
+            return rgl::load(path);
+        }
         let is_merl = path.extension().is_some_and(|extension| extension == "binary")
             || (read == head.len() && merl::dimensions(head) == merl::EXPECTED_DIMENSIONS);
         if is_merl { merl::load(path) } else { cornell::load(path) }

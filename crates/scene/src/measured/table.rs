@@ -30,6 +30,15 @@ const PHI_DIFFERENCE: usize = MEASURED_PHI_DIFFERENCE_BINS as usize;
 /// Cells of the grid.
 pub const CELL_COUNT: usize = THETA_HALF * THETA_DIFFERENCE * PHI_DIFFERENCE;
 
+/// Parts of an RGL file that the table has no place for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RglTraits {
+    /// The BRDF depends on the turn of the surface about its normal; the table holds the mean.
+    pub is_anisotropic: bool,
+    /// The file has spectra; the table holds their linear sRGB under D65.
+    pub is_spectral: bool,
+}
+
 /// Isotropic measured BRDF on a grid of θ_h × θ_d × φ_d, with its sampling table.
 #[derive(Clone, PartialEq)]
 pub struct MeasuredTable {
@@ -39,6 +48,8 @@ pub struct MeasuredTable {
     pub invalid_cell_count: usize,
     /// Repairs made while reading, for the log.
     pub warnings: Vec<String>,
+    /// Describes the file if it is one of RGL.
+    pub rgl: Option<RglTraits>,
 }
 
 impl fmt::Debug for MeasuredTable {
@@ -160,7 +171,7 @@ impl MeasuredTable {
                 *word = value.to_bits();
             }
         }
-        Ok(Self { words, invalid_cell_count, warnings })
+        Ok(Self { words, invalid_cell_count, warnings, rgl: None })
     }
 
     /// Words for the shader: `MEASURED_GRID_OFFSET`, then 2 per cell.

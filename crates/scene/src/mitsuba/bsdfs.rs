@@ -1,5 +1,7 @@
 //! Reflection models → [`MaterialKind`] and [`Surface`].
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::{
@@ -18,6 +20,7 @@ use crate::{
     import::media,
     material::{ConductorFresnel, MaterialKind, Opacity, Surface},
     math::colour::luminance,
+    measured::MeasuredTable,
     texture::TextureUse,
 };
 
@@ -153,6 +156,7 @@ impl Reader {
             }
             "thindielectric" => self.thin_dielectric(&parameters)?,
             "principled" => self.principled(&parameters)?,
+            "measured" => self.measured(&parameters)?,
             found => {
                 let name = format!("reflection model `{found}`, which is diffuse of 0.5");
                 self.ignored.add_named(features::MI_MODEL, &name, || node.place());
@@ -171,6 +175,25 @@ impl Reader {
                 Err(parameters.node.error(format!("{kind}: expected a bsdf in it, found none")))
             }
         }
+    }
+
+    fn measured(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+        let Some(name) = parameters.string("filename")? else {
+            return Err(parameters.node.error("measured: expected the parameter `filename`"));
+        };
+        let path = parameters.node.file(name)?;
+        let table = match self.tables.get(&path) {
+            Some(table) => Arc::clone(table),
+            None => {
+                let table = Arc::new(MeasuredTable::load(&path)?);
+                let named = |warning: &String| format!("{}: {warning}", path.display());
+                self.warnings.extend(table.warnings.iter().map(named));
+                self.inputs.push(path.clone());
+                self.tables.insert(path.clone(), Arc::clone(&table));
+                table
+            }
+        };
+        Ok(Model::new(MaterialKind::Measured { path, table }))
     }
 
     fn two_sided(&mut self, parameters: &Parameters<'_>) -> Result<Model> {

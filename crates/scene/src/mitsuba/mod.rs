@@ -40,13 +40,15 @@ use super::{
     instances::Prototype,
 };
 use crate::{
-    beside::Folder, error::Result, import::Imported, material::Material, texture::TextureCache,
+    beside::Folder, error::Result, import::Imported, material::Material, measured::MeasuredTable,
+    texture::TextureCache,
 };
 
 /// Scene on its way from the document.
 #[derive(Default)]
 struct Reader {
     textures: TextureCache,
+    tables: HashMap<PathBuf, Arc<MeasuredTable>>,
     environment: Option<EnvironmentMap>,
     lamps: Vec<Lamp>,
     materials: Vec<Material>,

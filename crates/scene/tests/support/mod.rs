@@ -4,3 +4,4 @@ pub mod folder;
 pub mod fuzz;
 pub mod gltf;
 pub mod seeds;
+pub mod tensor;

@@ -8,7 +8,8 @@
 //!   a white one of Mitsuba 3.9.1 reflects 0.96 of it at α = 0.05 and 0.69 at 0.3. Its linear variant
 //!   is nearer, since the base's albedo enters once.
 //! - `principled` has Disney's diffuse part.
-//! - Measured materials become diffuse with the same share of reflected light.
+//! - Measured materials become diffuse with the same share of reflected light, but those of RGL files are
+//!   `measured`.
 //! - Further ones are where the warnings are, in `models` and `lights`.
 //!
 //! Differences too small for a warning: the Gaussian filter is cut off at 2 pixels, not at 1.5; the

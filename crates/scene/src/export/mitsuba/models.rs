@@ -1,6 +1,6 @@
 //! Materials → `bsdf` elements, and the light of their surfaces.
 
-use std::fmt::Write;
+use std::{fmt::Write, path::Path};
 
 use glam::Vec3;
 
@@ -13,6 +13,7 @@ use crate::{
         triple,
     },
     material::{ConductorFresnel, MaterialKind},
+    measured::RglTraits,
     texture::TextureUse,
 };
 
@@ -160,10 +161,30 @@ impl Translator<'_> {
                 self.subject.without_color("dielectric");
                 element("thindielectric", &glass(*ior, *reflectance, *transmittance))
             }
-            MaterialKind::Measured { path, table } => {
-                element("diffuse", &rgb("reflectance", self.subject.measured(path, table)))
-            }
+            MaterialKind::Measured { path, table } => match table.rgl {
+                Some(traits) => self.measured(path, traits),
+                None => element("diffuse", &rgb("reflectance", self.subject.measured(path, table))),
+            },
         }
+    }
+
+    /// Copy of an RGL file, which Mitsuba reads.
+    fn measured(&mut self, path: &Path, traits: RglTraits) -> String {
+        let file = path.display();
+        if traits.is_anisotropic {
+            self.subject.warn(&format!(
+                "{file} is anisotropic in Mitsuba, along the tangents of the mesh; Fenestra renders its \
+                 mean over all turns"
+            ));
+        }
+        if traits.is_spectral {
+            self.subject.warn(&format!(
+                "{file} holds spectra, which only Mitsuba's spectral variants read; its rgb variants \
+                 read files with the field `rgb`"
+            ));
+        }
+        let name = self.pictures.copy(path);
+        element("measured", &string("filename", &self.folder.relative(&name)))
     }
 
     /// Base of Mitsuba's plastic, which loses light below its coat, that reflects as much as ours.
@@ -334,6 +355,10 @@ fn element(kind: &str, content: &str) -> String {
 /// Element with parameters around a model.
 fn around(kind: &str, content: &str, bsdf: &str) -> String {
     element(kind, &format!("{content}{}", indented(bsdf)))
+}
+
+fn string(name: &str, value: &str) -> String {
+    format!("    <string name=\"{name}\" value=\"{value}\"/>\n")
 }
 
 fn float(name: &str, value: f32) -> String {
