@@ -11,6 +11,9 @@ use crate::{
 /// Points of a texel of the lat-long map, along each side, whose mean it is; toward the poles, where
 /// texels are narrow, fewer in a row.
 const POINTS: u32 = 6;
+/// Share of the brightest by which centre and corners of a texel may differ for their mean to stand for it: a
+/// texel of the lat-long map is smaller than one of the square.
+const LIKE: f32 = 0.02;
 
 /// Resamples a square map, whose `texels` are those of `side` rows. `light_from_world` turns a
 /// direction of the renderer to one of the map, up to its length.
@@ -30,14 +33,24 @@ pub(crate) fn resample(
             uv.to_array().map(|at| ((at * side as f32) as u32).min(side - 1) as usize);
         texels[row * side as usize + column]
     };
+    let size = Vec2::new(width as f32, height as f32);
     let texel = |index: u32| {
         let corner = Vec2::new((index % width) as f32, (index / width) as f32);
-        let narrow = (std::f32::consts::PI * (corner.y + 0.5) / height as f32).sin();
+        let at =
+            |x: f32, y: f32| lookup(direction_from_lat_long((corner + Vec2::new(x, y)) / size));
+        let few =
+            [(0.5, 0.5), (0.1, 0.1), (0.9, 0.1), (0.1, 0.9), (0.9, 0.9)].map(|(x, y)| at(x, y));
+        let [least, most] = few
+            .iter()
+            .fold([few[0]; 2], |[least, most], texel| [least.min(*texel), most.max(*texel)]);
+        if (most - least).cmple(LIKE * most).all() {
+            return few.iter().sum::<Vec3>() / few.len() as f32;
+        }
+        let narrow = (std::f32::consts::PI * (corner.y + 0.5) / size.y).sin();
         let across = (POINTS as f32 * narrow).ceil() as u32;
         let point = |index: u32| {
             let inside = Vec2::new((index % across) as f32, (index / across) as f32) + 0.5;
-            let place = corner + inside / Vec2::new(across as f32, POINTS as f32);
-            lookup(direction_from_lat_long(place / Vec2::new(width as f32, height as f32)))
+            at(inside.x / across as f32, inside.y / POINTS as f32)
         };
         (0..across * POINTS).map(point).sum::<Vec3>() / (across * POINTS) as f32
     };
