@@ -171,7 +171,7 @@ fn later_vertices_may_be_sampled_as_by_mis() {
         let mut teacher = renderer(&scene, guided(None));
         teacher.render_pass(4).unwrap();
         let learned = teacher.guide_state().unwrap().unwrap();
-        // Of another film, so that it is rebuilt, and with all races behind it.
+        // As if from another film, so that it is rebuilt, with all races behind it.
         let (samples, races) = (u32::MAX, 40);
         let state = GuideState { samples, is_open: false, arm: Some(arm), races, ..learned };
         let values = rows(&scene, &guided(None), 600..600 + REPLICATES, 18, BLOCK, |renderer| {

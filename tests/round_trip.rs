@@ -9,6 +9,7 @@
 use std::{fs, path::PathBuf};
 
 use fenestra::{
+    pass::Roulette,
     scene::{Scene, export, lamp::LampKind, load::LoadOptions},
     session::Settings,
 };
@@ -63,7 +64,9 @@ struct Original {
 }
 
 fn settings() -> Settings {
-    Settings { depth: 4, ..Settings::default() }
+    // Few paths end: judgements need little noise.
+    let roulette = Roulette { vertex: 2, throughput: 0.02 };
+    Settings { depth: 4, roulette, ..Settings::default() }
 }
 
 impl Original {

@@ -393,7 +393,7 @@ fn interrupt_reference(sampler: &str) {
         "--samplers=mis",
         "--spp=1",
         "--seeds=1",
-        "--reference-spp=6000",
+        "--reference-spp=24000",
         "--depth=1",
         "--shadow-rays=5",
         &reference_sampler,
@@ -410,7 +410,7 @@ fn interrupt_reference(sampler: &str) {
         .find(|path| path.exists())
         .expect("what was rendered is kept");
     let samples = Checkpoint::read(&checkpoint).unwrap().sums.sample_count;
-    assert!((1..3000).contains(&samples), "{samples}");
+    assert!((1..12000).contains(&samples), "{samples}");
 
     folder.run(&options).assert(0, &[]);
     assert!(!checkpoint.exists());
@@ -418,7 +418,7 @@ fn interrupt_reference(sampler: &str) {
     let whole = [
         "render",
         "yard.toml",
-        "--spp=3000",
+        "--spp=12000",
         "--depth=1",
         "--shadow-rays=5",
         &format!("--seed={seed}"),
