@@ -461,7 +461,7 @@ fn tables_beyond_one_buffer_are_refused_by_name() {
         .collect();
     assert!(MaterialTables::new(&materials[..11]).is_ok());
     let message = MaterialTables::new(&materials).unwrap_err().to_string();
-    for part in ["128 MiB", "paint 0 (11.3 MiB)", "paint 11"] {
+    for part in ["128 MiB", "paint 0 (11.2 MiB)", "paint 11"] {
         assert!(message.contains(part), "{part:?} is missing in {message:?}");
     }
 }

@@ -220,16 +220,16 @@ fn shared(depth: u32) -> PassSettings {
 fn paths_are_shared_from_the_second_vertex_on() {
     let listed = |settings: &PassSettings, wave| names(&order(settings, &mis(), wave));
     let start = "camera trace sample shadow gather features keep_first bounce trace keep_second sample \
-                 shadow gather gather_base";
+                 shadow gather gather_shared";
     let end = "offer connect shadow admit weigh share deposit";
     assert_eq!(listed(&shared(2), wave(0, 1)), format!("{start} keep_third {end}"));
     assert_eq!(
         listed(&shared(3), wave(0, 1)),
         format!("{start} bounce keep_third trace sample shadow gather {end}")
     );
-    // Diffuse surfaces have no rest, and what other lamps bring is parted too.
+    // Diffuse surfaces need no choice, and what other lamps bring is parted too.
     let diffuse = PassSettings { surfaces: Surfaces::default(), ..shared(2) };
-    assert!(!listed(&diffuse, wave(0, 1)).contains("gather_base"));
+    assert!(!listed(&diffuse, wave(0, 1)).contains("gather_shared"));
     let lit = PassSettings { surfaces: everything(), ..shared(2) };
     assert!(
         listed(&lit, wave(0, 1)).contains("emit keep_second sample_lamps shadow gather sample")

@@ -9,6 +9,8 @@ const uint COHORT_PIXELS = COHORT_EDGE * COHORT_EDGE;
 
 // Dimension of the place of the cohorts, beyond those of all vertices.
 const uint DIMENSION_COHORT = 0x40000000u;
+// Dimension of the choice of what a path offers.
+const uint DIMENSION_OFFER = 0x40000001u;
 
 struct Cohort {
     // Path of the first pixel of the block.

@@ -5,12 +5,12 @@
 // of its first vertices, weighted by the balance heuristic.
 #version 460
 
-#include "base.glsl"
 #include "bvh.glsl"
 #include "first_vertex.glsl"
 #include "frame.glsl"
 #include "load.glsl"
 #include "sharing/cohort.glsl"
+#include "sharing/shared_part.glsl"
 #include "wave.glsl"
 
 TEXELS(offer_texels)
@@ -23,14 +23,33 @@ WRITES(seen)
 const float LEAST_SQUARED_DISTANCE = 1.0e-18;
 
 Offer load_offer(uint path) {
-    int texel = int(4u * path);
+    int texel = int(6u * path);
     uvec4 first = texelFetch(offer_texels, texel);
     uvec4 second = texelFetch(offer_texels, texel + 1);
     uvec4 third = texelFetch(offer_texels, texel + 2);
     uvec4 fourth = texelFetch(offer_texels, texel + 3);
     return Offer(
         uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz), uintBitsToFloat(second.w),
-        uintBitsToFloat(third.xyz), 0.0, uintBitsToFloat(fourth.xyz), 0.0);
+        uintBitsToFloat(third.xyz), uintBitsToFloat(third.w), uintBitsToFloat(fourth.xyz),
+        uintBitsToFloat(fourth.w), vec3(0.0), 0.0, vec3(0.0), 0.0);
+}
+
+// Radiance that the shared part of an offered vertex sends into a direction.
+vec3 offered_radiance(uint path, Offer offer, vec3 outgoing) {
+    Material material = load_material(offer.material);
+    if (is_kind(material, MATERIAL_DIFFUSE)) {
+        return offer.radiance;
+    }
+    int texel = int(6u * path);
+    if (IS_TEXTURED) {
+        vec3 reflectance = uintBitsToFloat(texelFetch(offer_texels, texel + 5).xyz);
+        material = varied(material, Surface(reflectance, offer.alpha, offer.metallic));
+    }
+    vec3 incident = uintBitsToFloat(texelFetch(offer_texels, texel + 4).xyz);
+    Frame frame = frame_from_normal(offer.shading_normal);
+    Reflector reflector = reflector_from(material, to_local(frame, outgoing));
+    vec3 value = brdf_evaluate(reflector, to_local(frame, incident));
+    return offer.radiance * shared_share(value) * value;
 }
 
 // Tests whether the shading normal of a second vertex looks the same from a direction: `trace.comp`
@@ -57,7 +76,8 @@ void connect_path(uint path) {
     float offset = ray_offset();
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         uint member = wave.first_shadow_ray + i;
-        Offer offer = load_offer(cohort_path(cohort, member));
+        uint other = cohort_path(cohort, member);
+        Offer offer = load_offer(other);
         vec3 to_second = offer.position - first.position;
         float squared = dot(to_second, to_second);
         vec3 direction = to_second * inversesqrt(max(squared, LEAST_SQUARED_DISTANCE));
@@ -71,9 +91,7 @@ void connect_path(uint path) {
         }
         vec3 contribution = vec3(0.0);
         if (pdf > 0.0) {
-            vec3 view = base_view(
-                load_material(offer.material), -dot(offer.shading_normal, direction));
-            contribution = throughput * offer.radiance * view;
+            contribution = throughput * offered_radiance(other, offer, -direction);
         }
         // From solid angle at the first vertex to area at the second.
         float geometry = cosine / max(squared, LEAST_SQUARED_DISTANCE);

@@ -1,12 +1,13 @@
-// Keeps the second vertices that the pixels of a cohort share: those with a diffuse base, whose light
-// does not depend on the direction from which it is seen. Their paths go on as if they had begun there,
+// Keeps the second vertices that the pixels of a cohort share. Their paths go on as if they had begun there,
 // and what they have gathered before waits in the vertex. All other paths stay as they are.
 #version 460
 
-#include "base.glsl"
 #include "first_vertex.glsl"
 #include "frame.glsl"
+#include "hit_surface.glsl"
 #include "load.glsl"
+#include "random.glsl"
+#include "sharing/cohort.glsl"
 #include "wave.glsl"
 
 UPDATES(paths)
@@ -15,7 +16,7 @@ WRITES(second_vertices)
 void keep_second(uint path) {
     second_vertices[path].scale = 0.0;
     Hit hit = load_hit(path);
-    if (hit.material == NO_MATERIAL || !has_base(load_material(hit.material))) {
+    if (hit.material == NO_MATERIAL) {
         return;
     }
     FirstVertex first = load_first_vertex(path);
@@ -33,11 +34,15 @@ void keep_second(uint path) {
     if (most <= 0.0) {
         return;
     }
+    Material material = load_surface(path, hit.material);
+    PathIndex index = wave_path(path);
+    float u = random_independent_1d(index.pixel, index.sample_index, DIMENSION_OFFER, wave.seed);
     // The path has weighed its throughput by 1 / density: the ratio of the two densities.
     second_vertices[path] = SecondVertex(
         hit.position, hit.geometric_normal, hit.shading_normal, -direction, state.throughput,
-        state.radiance, vec3(0.0), vec3(0.0), vec3(0.0), hit.material, strongest,
-        pdf * (strongest / most));
+        state.radiance, material.reflectance, material.alpha, material.ior, hit.material, strongest,
+        pdf * (strongest / most), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0),
+        0.0, 0.0, u);
     // As strong as before, so that roulette ends the path as often.
     state.throughput = vec3(strongest);
     state.radiance = vec3(0.0);

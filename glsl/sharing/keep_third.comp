@@ -1,8 +1,8 @@
 // Parts the light of second vertices in two: direct light, gathered so far, and what their paths still
-// find, of which the base has its share by the direction of the next ray.
+// find in the direction of the next ray.
 #version 460
 
-#include "base.glsl"
+#include "brdf.glsl"
 #include "frame.glsl"
 #include "hit_surface.glsl"
 #include "load.glsl"
@@ -17,16 +17,15 @@ void keep_third(uint path) {
         return;
     }
     Material material = load_surface(path, second.material);
-    second.direct = paths[path].radiance;
-    second.base = is_kind(material, MATERIAL_DIFFUSE) ? second.direct : second.base;
     Ray ray = load_ray(path);
-    if (ray.is_active != 0u) {
+    if (ray.is_active != 0u && !is_kind(material, MATERIAL_DIFFUSE)) {
         Frame frame = frame_from_normal(second.shading_normal);
-        second.bounce_share = base_share(
-            reflector_from(material, to_local(frame, second.outgoing)),
-            to_local(frame, ray.direction));
+        Reflector reflector = reflector_from(material, to_local(frame, second.outgoing));
+        second_vertices[path].bounce_direction = ray.direction;
+        second_vertices[path].bounce_value =
+            brdf_evaluate(reflector, to_local(frame, ray.direction));
     }
-    second_vertices[path] = second;
+    second_vertices[path].direct = paths[path].radiance;
     paths[path].radiance = vec3(0.0);
 }
 

@@ -1,30 +1,39 @@
-// Sums up what every path offers to the pixels of its cohort: the light that the base of its second
-// vertex reflects. Paths that found no light have nothing to offer, and nothing is traced to them.
+// Sums up what every path offers to the pixels of its cohort: the light that its second vertex reflects, if it
+// is the same from all sides, or else light that arrives there from one direction, chosen among all that
+// the path has found. Paths that found no light have nothing to offer, and nothing is traced to them.
 #version 460
 
-#include "base.glsl"
 #include "load.glsl"
+#include "sharing/shared_part.glsl"
 #include "wave.glsl"
 
 READS(paths)
-READS(second_vertices)
+UPDATES(second_vertices)
 WRITES(offers)
 
 void offer_path(uint path) {
     SecondVertex second = second_vertices[path];
-    vec3 radiance = second.base + second.bounce_share * paths[path].radiance;
-    if (second.scale == 0.0 || radiance == vec3(0.0)) {
-        offers[path].material = NO_MATERIAL;
+    offers[path].material = NO_MATERIAL;
+    if (second.scale == 0.0) {
         return;
     }
-    Material material = load_material(second.material);
-    vec3 view = base_view(material, dot(second.shading_normal, second.outgoing));
-    // A channel that the base does not reflect has no light of it either.
-    vec3 emitted = mix(
-        vec3(0.0), radiance / (second.scale * view), greaterThan(view, vec3(0.0)));
-    offers[path] = Offer(
-        second.position, second.material, second.geometric_normal, second.density_ratio,
-        second.shading_normal, 0.0, emitted, 0.0);
+    vec3 beyond = paths[path].radiance;
+    vec3 light;
+    if (is_kind(load_material(second.material), MATERIAL_DIFFUSE)) {
+        second.shared_light = second.direct + beyond;
+        light = second.shared_light;
+    } else {
+        take_light(second, second.bounce_direction, beyond, second.bounce_value);
+        light = second.weight > 0.0 ? second.arriving * (second.weight_sum / second.weight)
+                                    : vec3(0.0);
+    }
+    second_vertices[path].shared_light = second.shared_light;
+    if (light != vec3(0.0)) {
+        offers[path] = Offer(
+            second.position, second.material, second.geometric_normal, second.density_ratio,
+            second.shading_normal, second.alpha, light / second.scale, second.metallic,
+            second.incident, 0.0, second.reflectance, 0.0);
+    }
 }
 
 RUN_PATHS(offer_path)

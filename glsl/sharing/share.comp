@@ -1,6 +1,6 @@
 // Adds the light of all second vertices of the cohort that its first vertex sees to every path, each by
-// its weight. What the rest of the BRDF reflects stays with its own path, and so does a second vertex
-// that its own first vertex does not see.
+// its weight. All of a vertex that its own first vertex does not see stays with its own path, and so does
+// what narrow lobes reflect.
 #version 460
 
 #include "load.glsl"
@@ -15,22 +15,26 @@ UPDATES(paths)
 
 void share_path(uint path) {
     uint path_count = wave_path_count();
+    Cohort cohort = cohort_of(path);
     vec3 radiance = paths[path].radiance;
     SecondVertex second = second_vertices[path];
     if (second.scale > 0.0) {
-        vec3 shared_light = texelFetch(offer_weight_texels, int(path)).x > 0.0
-            ? second.base + second.bounce_share * radiance
-            : vec3(0.0);
-        vec3 rest = second.direct + radiance - shared_light;
-        radiance = second.radiance + second.throughput * (rest / second.scale);
+        float own_weight = texelFetch(offer_weight_texels, int(path)).x;
+        vec3 light = second.direct + radiance;
+        if (own_weight > 0.0) {
+            float density =
+                texelFetch(connection_texels, int(cohort.member * path_count + path)).w;
+            float share = own_weight * density / second.density_ratio;
+            light -= (1.0 - share) * second.shared_light;
+        }
+        radiance = second.radiance + second.throughput * (light / second.scale);
     }
     uvec2 seen_by_path = seen[path];
     if (seen_by_path != uvec2(0u)) {
-        Cohort cohort = cohort_of(path);
         for (uint member = 0u; member < COHORT_PIXELS; ++member) {
             float weight =
                 texelFetch(offer_weight_texels, int(cohort_path(cohort, member))).x;
-            if (weight > 0.0 && is_seen(seen_by_path, member)) {
+            if (weight > 0.0 && member != cohort.member && is_seen(seen_by_path, member)) {
                 radiance += weight
                     * texelFetch(connection_texels, int(member * path_count + path)).xyz;
             }

@@ -8,12 +8,12 @@ use super::{
     surfaces::Surfaces,
 };
 use crate::shader::{
-    constants::{CONSTANT_COHORT_EDGE, KINDS_WITH_BASE, MATERIAL_DIFFUSE},
+    constants::{CONSTANT_COHORT_EDGE, MATERIAL_DIFFUSE, SPECULAR_KINDS},
     structs::Wave,
 };
 
-/// Bits of the kinds of material that reflect more than their diffuse base (`glsl/include/base.glsl`).
-const WITH_BASE_AND_REST: u32 = KINDS_WITH_BASE & !(1 << MATERIAL_DIFFUSE);
+/// Bits of the kinds of material whose light looks the same from all sides, or is not shared.
+const SAME_OR_ALONE: u32 = SPECULAR_KINDS | 1 << MATERIAL_DIFFUSE;
 
 /// Moments of a vertex at which sharing may add a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,12 +48,12 @@ impl Sharing {
 
     /// The pass at a moment of a vertex, if there is one.
     pub(crate) fn at(&self, moment: Moment, vertex: u32) -> Option<Kernel> {
-        let has_rest = self.surfaces.material_kinds & WITH_BASE_AND_REST != 0;
+        let is_glossy = self.surfaces.material_kinds & !SAME_OR_ALONE != 0;
         let shader = match (vertex, moment) {
             (0, Moment::Leaving) => "keep_first",
             (1, Moment::Met) => "keep_second",
-            // Adds the light that the base of second vertices reflects, where it is not all.
-            (1, Moment::Gathered) if has_rest => "gather_base",
+            // Chooses light to offer, where it does not look the same from all sides.
+            (1, Moment::Gathered) if is_glossy => "gather_shared",
             // Parts the light of the second vertices.
             (1, Moment::Left) => "keep_third",
             _ => return None,

@@ -4,7 +4,7 @@ use super::texture_buffers::TextureAccess;
 use crate::{
     scene::material::{Material, MaterialKind},
     shader::constants::{
-        CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, KINDS_WITH_BASE, SURFACES_EMITTING,
+        CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, SPECULAR_KINDS, SURFACES_EMITTING,
         SURFACES_INSTANCED, SURFACES_LAMP_CELLS, SURFACES_ONE_SIDED, SURFACES_PASSING,
         SURFACES_SPECULAR, SURFACES_TEXTURED,
     },
@@ -51,9 +51,9 @@ impl Surfaces {
         self.features & SURFACES_LAMP_CELLS != 0
     }
 
-    /// True if some material has a diffuse base, whose light the pixels of a cohort can share.
-    pub(crate) fn has_base(&self) -> bool {
-        self.material_kinds & KINDS_WITH_BASE != 0
+    /// True if some material is not specular, so that the pixels of a cohort can share its light.
+    pub(crate) fn can_share(&self) -> bool {
+        self.material_kinds & !SPECULAR_KINDS != 0
     }
 
     /// True if paths meet surfaces at which no light is sampled.

@@ -82,7 +82,7 @@ impl Renderer {
         );
 
         let surfaces = buffers.surfaces();
-        let shares = settings.depth > 1 && surfaces.has_base();
+        let shares = settings.depth > 1 && surfaces.can_share();
         let cohort_edge = settings.sampler.cohort_edge(&settings.parameters);
         let cohort_edge = if shares { cohort_edge } else { 1 };
         let passes = PassSettings {

@@ -237,7 +237,7 @@ binding_tables! {
         42 SECOND_VERTICES: array SecondVertex;
         /// Offer of each path to the pixels of its cohort.
         43 OFFERS: array Offer;
-        /// Offers again, four texels each.
+        /// Offers again, six texels each.
         44 OFFER_TEXELS: texels Rgba32Uint;
         /// Weight of each offer.
         45 OFFER_WEIGHTS: array float;

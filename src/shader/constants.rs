@@ -234,9 +234,6 @@ constants! {
     MATERIAL_THIN_DIELECTRIC = 7;
     /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
     SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
-    /// Bits `1 << kind` of the kinds with a base, whose light the pixels of a cohort can share.
-    KINDS_WITH_BASE = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_PLASTIC | 1 << MATERIAL_MEASURED
-        | 1 << MATERIAL_PRINCIPLED;
 
     // Lamps.
     /// Marks a lamp without a surface in [`LampChoice::source`](super::structs::LampChoice::source).
@@ -335,10 +332,8 @@ constants! {
     MEASURED_CUMULATIVE_OFFSET = MEASURED_COSINE_SHARE_OFFSET + MEASURED_ELEVATION_BINS;
     /// Densities of the sampling cells by elevation, per steradian of half vectors.
     MEASURED_DENSITY_OFFSET = MEASURED_CUMULATIVE_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
-    /// Factors of the separable base by cosine, three channels a node, square root of 1/sr.
-    MEASURED_BASE_OFFSET = MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
     /// Grid cells, two words each: halves red and green, half blue.
-    MEASURED_GRID_OFFSET = MEASURED_BASE_OFFSET + 3 * BRDF_COSINE_NODES;
+    MEASURED_GRID_OFFSET = MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
     /// Lists of living paths: that of a vertex, the one before, which it is made from, and the next, which
     /// is emptied meanwhile; a power of two.
     PATH_LISTS = 4;

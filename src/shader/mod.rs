@@ -28,7 +28,6 @@ const _: () = {
         MEASURED_COSINE_SHARE_OFFSET,
         MEASURED_CUMULATIVE_OFFSET,
         MEASURED_DENSITY_OFFSET,
-        MEASURED_BASE_OFFSET,
         MEASURED_GRID_OFFSET
     );
     let (ours, theirs) = (constants::LUMINANCE_WEIGHTS, colour::LUMINANCE_WEIGHTS);

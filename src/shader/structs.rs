@@ -280,18 +280,36 @@ structs! {
         throughput: vec3,
         /// [`PathState::radiance`] of the path up to here.
         radiance: vec3,
-        /// Direct light that its diffuse base reflects, times `scale`.
-        base: vec3,
-        /// Direct light that it reflects, times `scale`.
-        direct: vec3,
-        /// Share of the diffuse base in what it reflects of the path's next ray.
-        bounce_share: vec3,
+        /// [`Surface::reflectance`], in scenes with textures.
+        reflectance: vec3,
+        /// [`Surface::alpha`], in scenes with textures.
+        alpha: float,
+        /// [`Surface::metallic`], in scenes with textures.
+        metallic: float,
         /// Material index.
         material: uint,
         /// Throughput with which the path goes on instead; 0 if the vertex is not shared.
         scale: float,
         /// Density of the BRDF's sampling over that with which the path came here.
         density_ratio: float,
+        /// Direct light that it reflects, times `scale`.
+        direct: vec3,
+        /// Light that the shared part of its BRDF reflects, times `scale`.
+        shared_light: vec3,
+        /// Direction of the path's next ray.
+        bounce_direction: vec3,
+        /// Value of the BRDF there, 1/sr.
+        bounce_value: vec3,
+        /// Direction of the light that is offered, chosen among all that the path found here.
+        incident: vec3,
+        /// That light before it is reflected, times `scale`.
+        arriving: vec3,
+        /// Sum of the weights of all light in that choice.
+        weight_sum: float,
+        /// Weight of the chosen light.
+        weight: float,
+        /// Number in [0, 1) for the next choice.
+        random_number: float,
     }
 
     /// Second vertex of a path as the other pixels of its cohort see it.
@@ -306,11 +324,20 @@ structs! {
         density_ratio: float,
         /// Unit shading normal.
         shading_normal: vec3,
+        /// [`Surface::alpha`], in scenes with textures.
+        alpha: float,
+        /// Radiance of a diffuse surface; else light that arrives from `incident`, to be multiplied by the value
+        /// of the shared part of the BRDF.
+        radiance: vec3,
+        /// [`Surface::metallic`], in scenes with textures.
+        metallic: float,
+        /// Unit vector to where that light comes from.
+        incident: vec3,
         /// Zero; pads a texel of four words.
         reserved: float,
-        /// Radiance of its diffuse base, without the factor that depends on the direction to the viewer.
-        radiance: vec3,
-        /// Zero; pads the last of four texels of four words.
+        /// [`Surface::reflectance`], in scenes with textures.
+        reflectance: vec3,
+        /// Zero; pads the last of six texels of four words.
         padding: float,
     }
 

@@ -26,8 +26,6 @@ pub const MEASURED_CUMULATIVE_OFFSET: u32 = MEASURED_COSINE_SHARE_OFFSET + MEASU
 /// Densities of the sampling cells by elevation, per steradian of half vectors.
 pub const MEASURED_DENSITY_OFFSET: u32 =
     MEASURED_CUMULATIVE_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
-/// Factors of the separable base by cosine, three channels a node, square root of 1/sr.
-pub const MEASURED_BASE_OFFSET: u32 =
-    MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
 /// Grid cells, two words each: halves red and green, half blue.
-pub const MEASURED_GRID_OFFSET: u32 = MEASURED_BASE_OFFSET + 3 * BRDF_COSINE_NODES;
+pub const MEASURED_GRID_OFFSET: u32 =
+    MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;

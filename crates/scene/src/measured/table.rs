@@ -2,7 +2,7 @@
 //! `measured_value`, `measured_pdf` and `measured_sample` of `brdf.glsl` read.
 //!
 //! Layout of the words: directional albedo, cosine shares, cumulative probabilities and densities
-//! of the sampling table, separable base, grid cells of two words; offsets are `MEASURED_…_OFFSET` of
+//! of the sampling table, grid cells of two words; offsets are `MEASURED_…_OFFSET` of
 //! [`layout`](super::layout).
 
 use std::{
@@ -15,11 +15,14 @@ use half::f16;
 use rayon::prelude::*;
 
 use crate::measured::{
-    base::separable_base,
     layout::*,
     lookup,
     tabulate::{EnergyLimit, SamplingRow, directional_albedo},
 };
+
+/// Least value of a cell, 1/sr: where a BRDF reflects nothing at all, light found for one direction could not be
+/// shared with others (`glsl/sharing/shared_part.glsl`).
+const LEAST_VALUE: f32 = 1e-6;
 
 /// Bins of θ_h as an index.
 const THETA_HALF: usize = MEASURED_THETA_HALF_BINS as usize;
@@ -165,11 +168,8 @@ impl MeasuredTable {
             .into_par_iter()
             .map(|node| directional_albedo(&words, node as f32 / BRDF_COSINE_INTERVALS as f32))
             .collect();
-        for (offset, values) in [(0, albedo), (MEASURED_BASE_OFFSET, separable_base(&words))] {
-            let target = &mut words[offset as usize..];
-            for (word, value) in target.iter_mut().zip(values.iter().flat_map(Vec3::to_array)) {
-                *word = value.to_bits();
-            }
+        for (word, value) in words.iter_mut().zip(albedo.iter().flat_map(Vec3::to_array)) {
+            *word = value.to_bits();
         }
         Ok(Self { words, invalid_cell_count, warnings, rgl: None })
     }
@@ -249,7 +249,9 @@ fn fill_line(cells: &mut [Vec3], first: usize, stride: usize, count: usize) {
 fn pack(cells: &[Vec3], words: &mut [u32]) {
     let grid = &mut words[MEASURED_GRID_OFFSET as usize..];
     grid.par_chunks_exact_mut(2).zip(cells).for_each(|(words, cell)| {
-        let half = |value: f32| u32::from(f16::from_f32(value.min(f16::MAX.to_f32())).to_bits());
+        let half = |value: f32| {
+            u32::from(f16::from_f32(value.clamp(LEAST_VALUE, f16::MAX.to_f32())).to_bits())
+        };
         words[0] = half(cell.x) | half(cell.y) << 16;
         words[1] = half(cell.z);
     });

@@ -1,11 +1,11 @@
-// Adds what the diffuse base of second vertices reflects of their visible shadow rays, where gather.comp
-// has added what the whole BRDF reflects.
+// Chooses among the visible shadow rays of second vertices the light that they offer, and counts what the shared
+// part of the BRDF reflects, where gather.comp has added what the whole reflects.
 #version 460
 
-#include "base.glsl"
 #include "frame.glsl"
 #include "hit_surface.glsl"
 #include "load.glsl"
+#include "sharing/shared_part.glsl"
 #include "wave.glsl"
 
 READS(visibility)
@@ -23,17 +23,18 @@ void gather_path(uint path) {
     }
     Frame frame = frame_from_normal(second.shading_normal);
     Reflector reflector = reflector_from(material, to_local(frame, second.outgoing));
-    vec3 sum = vec3(0.0);
+    float per_ray = second.scale / float(max(wave.total_shadow_rays, 1u));
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         uint index = i * path_count + path;
         ShadowRay ray = load_shadow_ray(index);
         if (ray.contribution != vec3(0.0) && visibility[index] != 0u) {
             vec3 direction = wave.to_lamps != 0u ? normalize(ray.direction) : ray.direction;
-            sum += ray.contribution * base_share(reflector, to_local(frame, direction));
+            take_light(
+                second, direction, per_ray * ray.contribution,
+                brdf_evaluate(reflector, to_local(frame, direction)));
         }
     }
-    second_vertices[path].base =
-        second.base + second.scale * (sum / float(max(wave.total_shadow_rays, 1u)));
+    second_vertices[path] = second;
 }
 
 RUN_PATHS(gather_path)
