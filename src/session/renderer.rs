@@ -22,12 +22,11 @@ const FEWEST_PATHS: u32 = 1 << 9;
 /// Factor between two tries.
 const PATHS_STEP: u32 = 1 << 4;
 
-/// Number of groups of lights that the settings ask for, before the work on buffers.
-fn light_groups(settings: &Settings, scene: &Scene) -> Result<u32> {
+/// Number of groups of lights that the settings ask for.
+fn light_group_count(settings: &Settings, groups: &LightGroups) -> Result<u32> {
     if !settings.aovs.contains(&Aov::LightGroups) {
         return Ok(0);
     }
-    let groups = LightGroups::new(scene);
     let names = groups.names();
     let count = u32::try_from(names.len()).unwrap_or(u32::MAX);
     if count > MOST_LIGHT_GROUPS {
@@ -56,7 +55,8 @@ impl Renderer {
     /// out or a limit of the device is exceeded.
     pub fn new(device: &Arc<Device>, scene: &Scene, settings: Settings) -> Result<Self> {
         settings.check([scene.film.width, scene.film.height])?;
-        light_groups(&settings, scene)?;
+        // Before the work on buffers.
+        light_group_count(&settings, &LightGroups::new(scene))?;
         let window = traced_window(&settings, scene);
         let buffers = Arc::new(SceneBuffers::new(device, scene, window)?);
         Self::with_scene_buffers(device, buffers, scene, settings)
@@ -89,7 +89,7 @@ impl Renderer {
             shadow_rays: settings.shadow_rays,
             depth: settings.depth,
             aovs: aov_bits(&settings.aovs),
-            light_groups: light_groups(&settings, scene)?,
+            light_groups: light_group_count(&settings, buffers.light_groups())?,
             roulette: settings.roulette,
             path_lists: settings.path_lists,
             cohort_edge,

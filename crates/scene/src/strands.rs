@@ -8,6 +8,7 @@ use super::mesh::Mesh;
 
 /// Triangles that all strands of a file together have at most, about.
 const MAX_TRIANGLES: usize = 1 << 21;
+/// Most pieces of a span.
 const PIECES: usize = 8;
 
 /// Polynomials that blend the control points of a span; a number is their degree, 2 or 3.

@@ -128,7 +128,7 @@ pub(super) enum Axes {
     Paths,
     /// Half and twice as many shadow rays.
     Rays,
-    /// Both at once.
+    /// Technique and paths at once.
     Techniques,
     /// Every arm that differs by one setting.
     Everything,
@@ -211,8 +211,7 @@ impl Arms {
             let steps = self.guided.clone().with_candidates(arm.candidates);
             let steps = steps.with_sharing(arm.shares_paths).with_rays(arm.rays);
             let steps = steps.with_bounces(arm.guides_bounces).with_roulette(roulette);
-            let is_mixed = !arm.guides_later;
-            Box::new(if is_mixed { steps.with_later(self.mis.clone()) } else { steps })
+            Box::new(if arm.guides_later { steps } else { steps.with_later(self.mis.clone()) })
         } else {
             let steps = self.mis.clone().with_rays(arm.rays).with_sharing(arm.shares_paths);
             Box::new(steps.with_roulette(roulette))

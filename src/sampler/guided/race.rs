@@ -253,8 +253,8 @@ mod tests {
         let due = |pixels| (0..8).map(|race| race_due(race, pixels).0).collect::<Vec<u32>>();
         assert_eq!(due(1 << 20), [0, 2, 2, 16, 64, 256, 1024, 4096]);
         assert_eq!(race_due(40, 1 << 20).0, u32::MAX);
-        // An eighth of the pixels, four samples each, three arms, four rounds: as much as 48 samples allow;
-        // the guide is next rebuilt after 64.
+        // An eighth of the pixels, four samples each, four arms, four rounds: as much as 64 samples,
+        // after which the guide is next rebuilt.
         assert_eq!(due(3072)[..3], [0, 64, 128]);
     }
 }

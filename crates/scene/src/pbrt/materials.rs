@@ -317,14 +317,15 @@ impl<'a> Materials<'a> {
             return Err(entity.error(message));
         }
         self.depth += 1;
-        let mut parts = Vec::new();
-        for part in names {
+        let parts = names.iter().map(|part| {
             let Some(part_entity) = self.description.materials.get(part) else {
                 return Err(entity.error(format!("there is no material `{part}`")));
             };
-            parts.push(self.named(part, part_entity)?);
-        }
+            self.named(part, part_entity)
+        });
+        let parts: Result<Vec<_>> = parts.collect();
         self.depth -= 1;
+        let mut parts = parts?;
         let (second, first) = (parts.pop().flatten(), parts.pop().flatten());
         let amount = self.textures.number(entity, "amount")?.unwrap_or(Value::number(0.5));
         self.textures.log.unused(entity);

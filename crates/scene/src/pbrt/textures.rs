@@ -128,8 +128,9 @@ impl<'a> Textures<'a> {
             return Ok(value.clone());
         }
         self.depth += 1;
-        let value = self.texture(entity, is_number)?;
+        let value = self.texture(entity, is_number);
         self.depth -= 1;
+        let value = value?;
         self.log.unused(entity);
         self.values.insert(key, value.clone());
         Ok(value)

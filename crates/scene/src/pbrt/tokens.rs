@@ -50,9 +50,11 @@ pub(super) struct Tokens<R> {
     reader: R,
     line: usize,
     column: usize,
+    /// Bytes that may still be read.
     pub(super) bytes_left: u64,
     buffer: Vec<u8>,
     pub(super) text: String,
+    /// Place of the last token, or of the end of the file.
     pub(super) place: Place,
 }
 

@@ -285,13 +285,11 @@ impl GltfReader<'_> {
         let specular = specular.filter(|_| lie_alike);
         if specular.is_none() && specular_color.max_element() <= STRONGEST_DIELECTRIC {
             let specular_color = specular_color / DEFAULT_REFLECTANCE;
-            let (metallic, rest) = (0.0, Principled::default());
+            let principled = Principled { base_color, roughness, ..Principled::default() };
             let kind = MaterialKind::Principled(Principled {
-                base_color,
-                metallic,
-                roughness,
+                metallic: 0.0,
                 specular_color,
-                ..rest
+                ..principled
             });
             return Ok(Reflection { kind, surface, base_color, alpha });
         }

@@ -8,17 +8,10 @@
 //! `GroupSum_NAME.R/G/B` and so on of each group of lights.
 //! Beside them, the picture `R`, `G`, `B` lets any viewer open the file. An attribute holds the
 //! SHA-256 of window, channels and attributes, so that damage does not pass for radiance.
-//!
-//! The guide of a sampler that learns lies in a file of its own, named by its content:
-//! `image.checkpoint.<hash>.guide`. It is written before the checkpoint that holds its hash, and
-//! the guide of the older checkpoint is removed after. The renaming of the checkpoint is the one
-//! moment at which both change, so a killed process leaves the old pair or the new one.
 
-use std::{
-    fs,
-    io::Write,
-    path::{Path, PathBuf},
-};
+mod pair;
+
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
@@ -30,10 +23,13 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    files::{self, hexadecimal, write_atomically},
+    files::hexadecimal,
     scene::light_group::ENVIRONMENT,
     shader::constants::{FILM_BLOCK, MATTE_SLOTS},
 };
+
+pub(crate) use pair::Encoded;
+pub use pair::{guide_paths, remove_checkpoint};
 
 /// Attribute that marks a checkpoint, and the version of its channels.
 const FORMAT_ATTRIBUTE: &str = "fenestra.checkpoint";
@@ -44,20 +40,6 @@ const PENDING: [&str; 3] = ["Pending.R", "Pending.G", "Pending.B"];
 const CHECKSUM_ATTRIBUTE: &str = "fenestra.checksum";
 /// SHA-256 of the guide's file.
 const GUIDE_ATTRIBUTE: &str = "fenestra.guide";
-/// Digits of that hash in the file's name.
-const GUIDE_NAME_DIGITS: usize = 12;
-
-/// Steps in which a checkpoint is written, in their order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Step {
-    /// The guide appears.
-    Guide,
-    /// The checkpoint takes the place of the older one.
-    Checkpoint,
-    /// The older guide goes.
-    Removal,
-}
-
 /// Everything needed to continue a render as if it had not stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
@@ -72,61 +54,11 @@ pub fn checkpoint_path(image: &Path) -> PathBuf {
     image.with_extension("checkpoint.exr")
 }
 
-/// Path of the guide with this hash: `image.checkpoint.exr` → `image.checkpoint.<hash>.guide`.
-fn guide_path(checkpoint: &Path, hash: &str) -> PathBuf {
-    let digits: String = hash.chars().take(GUIDE_NAME_DIGITS).collect();
-    checkpoint.with_extension(format!("{digits}.guide"))
-}
-
-/// Lists the guides that lie beside a checkpoint.
-///
-/// # Errors
-/// [`Error::Io`] for a folder that cannot be read.
-pub fn guide_paths(checkpoint: &Path) -> Result<Vec<PathBuf>> {
-    let folder = files::parent_of(checkpoint);
-    let stem = checkpoint.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    let prefix = stem.unwrap_or_default() + ".";
-    let is_guide = |path: &PathBuf| {
-        let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
-        let name = name.unwrap_or_default();
-        let hash = name.strip_prefix(&prefix).and_then(|rest| rest.strip_suffix(".guide"));
-        hash.is_some_and(|hash| {
-            hash.len() == GUIDE_NAME_DIGITS
-                && hash.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
-        })
-    };
-    let entries =
-        fs::read_dir(folder).map_err(|source| Error::io(folder, "read folder", source))?;
-    let mut paths: Vec<PathBuf> =
-        entries.flatten().map(|entry| entry.path()).filter(is_guide).collect();
-    paths.sort();
-    Ok(paths)
-}
-
-/// Removes a checkpoint and its guides, where they exist.
-///
-/// # Errors
-/// [`Error::Io`] with the cause.
-pub fn remove_checkpoint(path: &Path) -> Result<()> {
-    files::remove(path)?;
-    guide_paths(path)?.iter().try_for_each(|guide| files::remove(guide))
-}
-
-/// Locks the folder of a checkpoint against other writers, where the system has such locks.
-fn locked_folder(path: &Path) -> Option<fs::File> {
-    let folder = fs::File::open(files::parent_of(path)).ok()?;
-    folder.lock().ok()?;
-    Some(folder)
-}
-
 /// Tests whether `path` is named like a checkpoint.
 pub(crate) fn is_checkpoint_path(path: &Path) -> bool {
     path.file_name()
         .is_some_and(|name| name.to_string_lossy().to_lowercase().ends_with(".checkpoint.exr"))
 }
-
-/// Path and bytes of a guide.
-pub(crate) type GuideFile = (PathBuf, Vec<u8>);
 
 impl Checkpoint {
     /// Tests whether an image file holds a checkpoint.
@@ -169,22 +101,6 @@ impl Checkpoint {
         image
     }
 
-    /// Writes the checkpoint of a sampler that does not learn, atomically.
-    ///
-    /// # Errors
-    /// [`Error::Io`] with the cause.
-    pub fn write(&self, path: &Path) -> Result<()> {
-        self.write_with_guide(path, None)
-    }
-
-    /// Writes the checkpoint and the file of its guide, as [`Encoded::write`].
-    ///
-    /// # Errors
-    /// [`Error::Io`] with the cause.
-    pub fn write_with_guide(&self, path: &Path, guide: Option<&[u8]>) -> Result<()> {
-        self.encode(guide.map(<[u8]>::to_vec)).write(path)
-    }
-
     /// Prepares the files: most of the work of a large film.
     pub(crate) fn encode(&self, guide: Option<Vec<u8>>) -> Encoded {
         let mut image = self.to_image();
@@ -204,29 +120,6 @@ impl Checkpoint {
     /// does not match its checksum.
     pub fn read(path: &Path) -> Result<Self> {
         Self::from_image(&Image::read_exr(path)?, path)
-    }
-
-    /// Reads a checkpoint and the path and bytes of its guide, if it has one.
-    ///
-    /// # Errors
-    /// As [`Checkpoint::read`], for either file.
-    pub fn read_with_guide(path: &Path) -> Result<(Self, Option<GuideFile>)> {
-        // Another process may replace the pair between the two files.
-        let _lock = locked_folder(path);
-        let image = Image::read_exr(path)?;
-        let checkpoint = Self::from_image(&image, path)?;
-        let Some(Attribute::Text(hash)) = image.attributes.get(GUIDE_ATTRIBUTE) else {
-            return Ok((checkpoint, None));
-        };
-        let guide_path = guide_path(path, hash);
-        let guide = files::read(&guide_path)?;
-        if hexadecimal(&Sha256::digest(&guide)) != *hash {
-            return Err(Error::format(
-                &guide_path,
-                format!("damaged, or not the guide of {}", path.display()),
-            ));
-        }
-        Ok((checkpoint, Some((guide_path, guide))))
     }
 
     /// Extracts the checkpoint from an image file; `path` only serves error messages.
@@ -392,68 +285,6 @@ impl Checkpoint {
     }
 }
 
-/// A checkpoint as the files that it is written to.
-pub(crate) struct Encoded {
-    image: Image,
-    guide: Option<Vec<u8>>,
-}
-
-impl Encoded {
-    /// Writes the checkpoint and the file of its guide. Both replace older ones at one moment: at
-    /// every other, and after every failure, the older pair or the newer one is complete.
-    ///
-    /// # Errors
-    /// [`Error::Io`] with the cause.
-    pub(crate) fn write(&self, path: &Path) -> Result<()> {
-        self.write_in_steps(path, &mut |_| Ok(()))
-    }
-
-    /// [`Self::write`], which asks `before` each step whether to go on.
-    fn write_in_steps(
-        &self,
-        path: &Path,
-        before: &mut dyn FnMut(Step) -> Result<()>,
-    ) -> Result<()> {
-        // Others that write this checkpoint would remove the guide before its checkpoint is there.
-        let _lock = locked_folder(path);
-        let Self { image, guide } = self;
-        let mut kept = None;
-        let mut added = None;
-        if let (Some(guide), Some(Attribute::Text(hash))) =
-            (guide, image.attributes.get(GUIDE_ATTRIBUTE))
-        {
-            let guide_path = guide_path(path, hash);
-            before(Step::Guide)?;
-            let is_new = !guide_path.exists();
-            write_atomically(&guide_path, |file| file.write_all(guide))?;
-            kept = guide_path.file_name().map(ToOwned::to_owned);
-            added = is_new.then_some(guide_path);
-        }
-        before(Step::Checkpoint)?;
-        if let Err(error) = image.write_exr_uncompressed(path) {
-            // Without its checkpoint a guide only takes space, but the disk may fail after the renaming.
-            let guide_of = |image: &Image| image.attributes.get(GUIDE_ATTRIBUTE).cloned();
-            let is_named =
-                Image::read_exr(path).is_ok_and(|found| guide_of(&found) == guide_of(image));
-            for guide in added.iter().filter(|_| !is_named) {
-                files::remove(guide).unwrap_or_else(|error| log::warn!("{error}"));
-            }
-            return Err(error);
-        }
-        before(Step::Removal)?;
-        // The checkpoint is safe: a guide that stays behind does no harm.
-        let remove_others = || {
-            let others = guide_paths(path)?;
-            let others = others.iter().filter(|other| other.file_name() != kept.as_deref());
-            others.into_iter().try_for_each(|other| files::remove(other))
-        };
-        if let Err(error) = remove_others() {
-            log::warn!("{error}");
-        }
-        Ok(())
-    }
-}
-
 /// Inserts four channels for pairs of counts: leading part and rest of the first count, then of the
 /// second. Inserts nothing without pairs.
 fn insert_counts(image: &mut Image, names: [&str; 4], counts: &[[u32; 2]]) {
@@ -544,123 +375,4 @@ fn checksum(image: &Image) -> String {
         }
     }
     hexadecimal(&hasher.finalize())
-}
-
-#[cfg(test)]
-mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
-    use super::*;
-    use crate::film::SampleRange;
-
-    fn checkpoint(samples: u32) -> Checkpoint {
-        let mut sums = Sums::new([0, 0], 2, 1, [2, 1]);
-        sums.sum = vec![[samples as f32; 3]; 2];
-        sums.sample_count = samples;
-        let range = SampleRange { seed: 1, first: 0, count: samples };
-        Checkpoint {
-            sums,
-            metadata: Metadata { sample_ranges: vec![range], ..Metadata::default() },
-        }
-    }
-
-    /// Stops the second writing before each of its steps, as a killed process or a full disk does,
-    /// and within the first two, which leaves a part of a temporary file behind.
-    #[test]
-    fn a_complete_pair_exists_after_every_step() {
-        let pair = |samples: u32| (checkpoint(samples), format!("guide of {samples}").into_bytes());
-        for stop in [Step::Guide, Step::Checkpoint, Step::Removal] {
-            let folder = tempfile::tempdir().unwrap();
-            let path = folder.path().join("room.checkpoint.exr");
-            let write = |samples: u32, before: &mut dyn FnMut(Step) -> Result<()>| {
-                let (checkpoint, guide) = pair(samples);
-                checkpoint.encode(Some(guide)).write_in_steps(&path, before)
-            };
-            let read = || {
-                let (checkpoint, guide) = Checkpoint::read_with_guide(&path).unwrap();
-                (checkpoint, guide.unwrap().1)
-            };
-            write(4, &mut |_| Ok(())).unwrap();
-            assert_eq!(read(), pair(4));
-            fs::write(folder.path().join(".fenestra-1-part.tmp"), "part").unwrap();
-            let stopped = |step| if step == stop { Err(Error::Interrupted) } else { Ok(()) };
-            assert!(write(8, &mut { stopped }).is_err());
-            assert_eq!(read(), pair(if stop == Step::Removal { 8 } else { 4 }), "{stop:?}");
-            // The next writing removes what the stopped one left behind.
-            write(12, &mut |_| Ok(())).unwrap();
-            assert_eq!(read(), pair(12), "{stop:?}");
-            assert_eq!(guide_paths(&path).unwrap().len(), 1, "{stop:?}");
-            remove_checkpoint(&path).unwrap();
-            assert!(!path.exists() && guide_paths(&path).unwrap().is_empty());
-        }
-    }
-
-    /// The second writer comes when the guide of the first is there, its checkpoint not yet.
-    #[test]
-    fn two_writers_leave_a_complete_pair() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("room.checkpoint.exr");
-        std::thread::scope(|scope| {
-            let second = || checkpoint(8).write_with_guide(&path, Some(b"second")).unwrap();
-            let mut before = |step| {
-                if step == Step::Checkpoint {
-                    let writer = scope.spawn(second);
-                    let start = std::time::Instant::now();
-                    while !writer.is_finished() && start.elapsed().as_millis() < 100 {
-                        std::thread::yield_now();
-                    }
-                }
-                Ok(())
-            };
-            checkpoint(4)
-                .encode(Some(b"first".to_vec()))
-                .write_in_steps(&path, &mut before)
-                .unwrap();
-            assert!(Checkpoint::read_with_guide(&path).unwrap().1.is_some());
-        });
-        assert_eq!(Checkpoint::read_with_guide(&path).unwrap().1.unwrap().1, b"second");
-    }
-
-    #[test]
-    fn obstacles_leave_the_older_pair() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("room.checkpoint.exr");
-        checkpoint(4).write_with_guide(&path, Some(b"older")).unwrap();
-        // A folder where the guide should go
-        let obstacle = guide_path(&path, &hexadecimal(&Sha256::digest(b"newer")));
-        fs::create_dir(&obstacle).unwrap();
-        assert!(checkpoint(8).write_with_guide(&path, Some(b"newer")).is_err());
-        let (read, guide) = Checkpoint::read_with_guide(&path).unwrap();
-        assert_eq!((read, guide.unwrap().1), (checkpoint(4), b"older".to_vec()));
-        // A folder where the checkpoint should go
-        fs::remove_dir(&obstacle).unwrap();
-        let kept = folder.path().join("kept");
-        fs::rename(&path, &kept).unwrap();
-        fs::create_dir(&path).unwrap();
-        assert!(checkpoint(8).write_with_guide(&path, Some(b"newer")).is_err());
-        assert_eq!(guide_paths(&path).unwrap().len(), 1, "the try leaves nothing");
-        fs::remove_dir(&path).unwrap();
-        fs::rename(&kept, &path).unwrap();
-        let (read, guide) = Checkpoint::read_with_guide(&path).unwrap();
-        assert_eq!((read, guide.unwrap().1), (checkpoint(4), b"older".to_vec()));
-    }
-
-    #[test]
-    fn a_damaged_or_exchanged_guide_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("room.checkpoint.exr");
-        checkpoint(4).write_with_guide(&path, Some(b"learned")).unwrap();
-        let guide = guide_paths(&path).unwrap().remove(0);
-        fs::write(&guide, b"lEarned").unwrap();
-        let error = Checkpoint::read_with_guide(&path).unwrap_err().to_string();
-        assert!(error.contains("damaged, or not the guide of"), "{error}");
-        fs::remove_file(&guide).unwrap();
-        let error = Checkpoint::read_with_guide(&path).unwrap_err().to_string();
-        assert!(error.contains(".guide: cannot read"), "{error}");
-        // A checkpoint of a sampler that does not learn removes guides of older ones.
-        checkpoint(4).write_with_guide(&path, Some(b"learned")).unwrap();
-        checkpoint(8).write(&path).unwrap();
-        assert_eq!(guide_paths(&path).unwrap(), Vec::<PathBuf>::new());
-        assert!(Checkpoint::read_with_guide(&path).unwrap().1.is_none());
-    }
 }
