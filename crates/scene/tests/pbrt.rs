@@ -319,10 +319,14 @@ fn materials_are_the_nearest() {
         material(r#""thindielectric""#).kind,
         MaterialKind::ThinDielectric { ior: 1.5, .. }
     ));
-    assert!(
-        message(&format!("Material \"measured\" {TRIANGLE}"))
-            .contains("`measured` cannot be rendered")
-    );
+    for (parameter, expected) in [
+        ("", "expected a `filename`"),
+        (r#""string filename" "../a.bsdf""#, "`../a.bsdf` leads out of that folder"),
+        (r#""string filename" "a.bsdf""#, "a.bsdf"),
+    ] {
+        let found = message(&format!("Material \"measured\" {parameter} {TRIANGLE}"));
+        assert!(found.contains(expected), "{found}");
+    }
     assert!(message(&format!("Material \"matte\" {TRIANGLE}")).contains("--upgrade"));
     assert!(
         message(&format!("NamedMaterial \"x\" {TRIANGLE}"))

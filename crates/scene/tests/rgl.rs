@@ -6,6 +6,7 @@
 use std::{
     f64::consts::{FRAC_PI_2, PI, TAU},
     fs,
+    sync::Arc,
 };
 
 use fenestra_scene::{
@@ -228,6 +229,25 @@ fn mitsuba_scenes_keep_their_measurements() {
     assert_eq!(xml.matches("type=\"measured\"").count(), 2, "{xml}");
     assert_eq!(xml.matches(name).count(), 2, "{xml}");
     assert!(fs::read(folder.path().join("out/f00_gold_leaf.bsdf")).unwrap() == bytes);
+}
+
+/// pbrt's `measured` is the same table, read once and shown on both sides.
+#[test]
+fn pbrt_scenes_keep_their_measurements() {
+    let (_, fields) = isotropic(0.2);
+    let folder = Folder::new();
+    folder.write("maps/gold.bsdf", encode(&fields));
+    let material = r#"Material "measured" "string filename" "maps/gold.bsdf" Shape "sphere""#;
+    let text = format!("Camera \"perspective\" WorldBegin {material} {material}");
+    let scene = Scene::load(&folder.write("a.pbrt", text)).unwrap();
+    let [first, second] = [0, 1].map(|index| match &scene.materials[index].kind {
+        MaterialKind::Measured { table, .. } => table,
+        other => panic!("{other:?}"),
+    });
+    assert!(Arc::ptr_eq(first, second) && scene.materials[0].surface.two_sided);
+    assert_holds(first, &read(&fields));
+    assert_eq!(scene.inputs.iter().filter(|input| input.ends_with("gold.bsdf")).count(), 1);
+    assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
 }
 
 #[test]

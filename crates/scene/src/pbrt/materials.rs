@@ -1,5 +1,7 @@
 //! Materials of a scene description → the nearest [`Material`]s.
 
+use std::{collections::HashMap, path::PathBuf, sync::Arc};
+
 use glam::Vec3;
 
 use super::{
@@ -18,6 +20,7 @@ use crate::{
         media,
     },
     material::{ConductorFresnel, Material, MaterialKind, Surface},
+    measured::MeasuredTable,
     texture::TextureUse,
 };
 
@@ -35,6 +38,7 @@ const SOLID_IOR: (f32, f32) = (0.1, 10.0);
 pub(super) struct Materials<'a> {
     pub description: &'a Description,
     pub textures: Textures<'a>,
+    tables: HashMap<PathBuf, Arc<MeasuredTable>>,
     /// Mixtures around the material that is made.
     depth: usize,
 }
@@ -48,7 +52,7 @@ struct Roughness {
 
 impl<'a> Materials<'a> {
     pub(super) fn new(description: &'a Description, textures: Textures<'a>) -> Self {
-        Self { description, textures, depth: 0 }
+        Self { description, textures, tables: HashMap::new(), depth: 0 }
     }
 
     /// Makes the material that a shape takes; none for a surface that is not there.
@@ -144,11 +148,7 @@ impl<'a> Materials<'a> {
             }
             "mix" => return self.mix(entity, name),
             "interface" | "none" | "" => return Ok(None),
-            "measured" => {
-                let message = "the material `measured` cannot be rendered; choose another, such as \
-                               coateddiffuse";
-                return Err(entity.error(message));
-            }
+            "measured" => self.measured(entity)?,
             other => {
                 return Err(entity.error(format!(
                     "unknown material `{other}`; files of pbrt-v3 are converted by `pbrt --upgrade`"
@@ -161,6 +161,26 @@ impl<'a> Materials<'a> {
         }
         self.textures.log.unused(entity);
         Ok(Some(Material { name, kind, surface }))
+    }
+
+    fn measured(&mut self, entity: &Entity) -> Result<MaterialKind> {
+        let Some(name) = entity.string("filename")? else {
+            return Err(entity.error("expected a `filename`"));
+        };
+        let Textures { folder, log, .. } = &mut self.textures;
+        let path = folder.file(name).map_err(|message| entity.error(message))?;
+        let table = match self.tables.get(&path) {
+            Some(table) => Arc::clone(table),
+            None => {
+                let table = Arc::new(MeasuredTable::load(&path)?);
+                let named = |warning: &String| format!("{}: {warning}", path.display());
+                log.warnings.extend(table.warnings.iter().map(named));
+                log.inputs.push(path.clone());
+                self.tables.insert(path.clone(), Arc::clone(&table));
+                table
+            }
+        };
+        Ok(MaterialKind::Measured { path, table })
     }
 
     /// Marks the parameters of a coat as read, and reports a coat that absorbs or scatters.
