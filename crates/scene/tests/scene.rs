@@ -846,6 +846,41 @@ fn scenes_of_other_programs_are_included_with_their_lamps() {
 }
 
 #[test]
+fn an_included_file_names_the_group_of_its_lights() {
+    let folder = Folder::new();
+    let quad = "Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0]\n";
+    let material =
+        "MakeNamedMaterial \"pane\" \"string type\" \"diffuse\"\nNamedMaterial \"pane\"\n";
+    folder.write("quad.pbrt", format!("Camera \"perspective\"\nWorldBegin\n{material}{quad}"));
+    let light = "LightSource \"point\"\nAreaLightSource \"diffuse\"\n";
+    folder.write("lamps.pbrt", format!("Camera \"perspective\"\nWorldBegin\n{light}{quad}"));
+    let scene = |include: &str| {
+        let glow = with_box("").replace("\"diffuse\"", "\"diffuse\"\nemission = [1, 1, 1]");
+        folder.load(&format!("{glow}[[include]]\nfile = {include}\n")).unwrap()
+    };
+    let groups = |scene: &Scene| LightGroups::new(scene).names().to_vec();
+    assert_eq!(groups(&scene("\"lamps.pbrt\"")), ["environment", "lamps"]);
+    let named = scene("\"lamps.pbrt\"\nlight_group = \"ceiling\"");
+    assert_eq!(groups(&named), ["environment", "ceiling", "lamps"]);
+    assert_eq!(named.lamps[0].light_group.as_deref(), Some("ceiling"));
+    let lit = |scene: &Scene| {
+        let index = scene.geometry.materials.last().copied().unwrap() as usize;
+        scene.materials[index].surface.light_group.clone()
+    };
+    assert_eq!(lit(&named).as_deref(), Some("ceiling"));
+    // A material of the scene that emits in place of one of the file belongs to the group there alone.
+    let replaced = "\"quad.pbrt\"\nlight_group = \"ceiling\"\nmaterials = { pane = \"grey\" }";
+    let replaced = scene(replaced);
+    assert_eq!(groups(&replaced), ["environment", "ceiling", "lamps"]);
+    assert_eq!(lit(&replaced).as_deref(), Some("ceiling"));
+    let dark = scene("\"quad.pbrt\"\nlight_group = \"ceiling\"").warnings;
+    assert!(
+        dark.iter().any(|line| line.ends_with("ignored light_group: the file emits no light")),
+        "{dark:?}"
+    );
+}
+
+#[test]
 fn files_that_are_no_scenes_are_refused() {
     let message = Scene::load(Path::new("missing.toml")).unwrap_err().to_string();
     assert!(message.contains("missing.toml: cannot read"), "{message}");

@@ -177,6 +177,8 @@ pub(crate) struct IncludeKeys {
     /// Materials of the scene in place of materials of the file: `{ glass = "pane" }`.
     #[serde(default)]
     pub materials: BTreeMap<String, String>,
+    /// Group of the light of its lamps and of its surfaces that emit. Default: lamps.
+    pub light_group: Option<String>,
 }
 
 impl SceneFile {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::{Loader, whole};
+use super::{Loader, objects::lit_material, whole};
 use crate::{
     Geometry, Lamp,
     error::Result,
@@ -29,11 +29,13 @@ impl Loader<'_> {
         inputs: &mut Vec<PathBuf>,
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Lamp>> {
-        let IncludeKeys { file, scale, rotate_deg, translate, materials: replaced } = &entry.keys;
+        let IncludeKeys { file, scale, rotate_deg, translate, materials: replaced, light_group } =
+            &entry.keys;
         let label = format!("include {} (line {})", file.display(), entry.line);
+        self.check_light_group(&label, light_group.as_deref())?;
         self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
         let path = self.folder.join(file);
-        let Contents { materials: own_materials, geometry: mut placed, lamps } =
+        let Contents { materials: own_materials, geometry: mut placed, mut lamps } =
             self.contents(&label, &path, inputs, warnings)?;
         for name in replaced.keys() {
             let is_there = own_materials.iter().any(|material| material.name == *name);
@@ -55,13 +57,28 @@ impl Loader<'_> {
                 *absorption /= length_scale;
             }
             places.push(match replaced.get(&own.name) {
-                Some(name) => self.material_index(&label, name, materials)?,
+                Some(name) => {
+                    let index = self.material_index(&label, name, materials)?;
+                    light_group.as_ref().map_or(index, |group| {
+                        lit_material(index as usize, group, materials) as u32
+                    })
+                }
                 None => {
+                    if own.surface.emission.is_some() {
+                        own.surface.light_group.clone_from(light_group);
+                    }
                     let name = format!("{stem}/{}", own.name);
                     materials.push(Material { name, ..own });
                     materials.len() as u32 - 1
                 }
             });
+        }
+        if let Some(group) = light_group {
+            let is_lit = |place: &u32| materials[*place as usize].surface.emission.is_some();
+            if lamps.is_empty() && !places.iter().any(is_lit) {
+                warnings.push(format!("{label}: ignored light_group: the file emits no light"));
+            }
+            lamps.iter_mut().for_each(|lamp| lamp.light_group = Some(group.clone()));
         }
         let vertices = geometry.positions.len() + placed.positions.len();
         let triangles = geometry.triangles.len() + placed.triangles.len();

@@ -339,7 +339,7 @@ impl Loader<'_> {
 }
 
 /// Finds a material whose light belongs to a group, as `of` looks, or adds it.
-fn lit_material(of: usize, group: &str, materials: &mut Vec<Material>) -> usize {
+pub(super) fn lit_material(of: usize, group: &str, materials: &mut Vec<Material>) -> usize {
     let mut lit = materials[of].clone();
     if lit.surface.emission.is_none() {
         return of;
