@@ -1,9 +1,8 @@
 //! `[[material]]` → validated materials with their textures.
 
 use std::{
-    collections::{BTreeMap, BTreeSet, HashMap},
+    collections::{BTreeSet, HashMap},
     path::PathBuf,
-    sync::Arc,
 };
 
 use glam::Vec3;
@@ -16,7 +15,7 @@ use crate::{
         Textured,
     },
     material::{ConductorFresnel, Emission, Material, MaterialKind, Opacity, Principled, Surface},
-    measured::MeasuredTable,
+    measured::MeasuredFiles,
     texture::{Channels, Encoding, Texture, TextureCache, TextureUse},
     transform::sine_cosine_deg,
 };
@@ -25,7 +24,8 @@ use crate::{
 #[derive(Default)]
 struct Loaded {
     textures: TextureCache,
-    tables: BTreeMap<PathBuf, Arc<MeasuredTable>>,
+    measured: MeasuredFiles,
+    inputs: Vec<PathBuf>,
     warnings: Vec<String>,
 }
 
@@ -69,12 +69,8 @@ impl Loader<'_> {
         let of_arrays: BTreeSet<_> =
             self.arrays.images.keys().map(|name| self.folder.join(name)).collect();
         inputs.extend(loaded.textures.files().difference(&of_arrays).cloned());
-        inputs.extend(loaded.tables.keys().cloned());
+        inputs.append(&mut loaded.inputs);
         warnings.append(&mut loaded.warnings);
-        for (path, table) in &loaded.tables {
-            let named = |warning: &String| format!("{}: {warning}", path.display());
-            warnings.extend(table.warnings.iter().map(named));
-        }
         Ok(materials)
     }
 
@@ -221,14 +217,8 @@ impl Loader<'_> {
             }
             MaterialKindEntry::Measured(entry) => {
                 let path = self.folder.join(&entry.file);
-                let table = match loaded.tables.get(&path) {
-                    Some(table) => Arc::clone(table),
-                    None => {
-                        let table = Arc::new(MeasuredTable::load(&path)?);
-                        loaded.tables.insert(path.clone(), Arc::clone(&table));
-                        table
-                    }
-                };
+                let Loaded { measured, inputs, warnings, .. } = loaded;
+                let table = measured.table(&path, inputs, warnings)?;
                 MaterialKind::Measured { path, table }
             }
         })

@@ -13,7 +13,12 @@ mod table;
 mod tabulate;
 mod tensor;
 
-use std::{io::Read, path::Path};
+use std::{
+    collections::HashMap,
+    io::Read,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use crate::{
     error::{Error, Result},
@@ -36,5 +41,30 @@ impl MeasuredTable {
         let is_merl = path.extension().is_some_and(|extension| extension == "binary")
             || (read == head.len() && merl::dimensions(head) == merl::EXPECTED_DIMENSIONS);
         if is_merl { merl::load(path) } else { cornell::load(path) }
+    }
+}
+
+/// Tables of measured BRDFs by file, each loaded once.
+#[derive(Default)]
+pub(crate) struct MeasuredFiles(HashMap<PathBuf, Arc<MeasuredTable>>);
+
+impl MeasuredFiles {
+    /// Returns the table of a file. The first time, adds the file to `inputs`, and its warnings by its name. Fails
+    /// as [`MeasuredTable::load`].
+    pub(crate) fn table(
+        &mut self,
+        path: &Path,
+        inputs: &mut Vec<PathBuf>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Arc<MeasuredTable>> {
+        if let Some(table) = self.0.get(path) {
+            return Ok(Arc::clone(table));
+        }
+        let table = Arc::new(MeasuredTable::load(path)?);
+        let named = |warning: &String| format!("{}: {warning}", path.display());
+        warnings.extend(table.warnings.iter().map(named));
+        inputs.push(path.to_owned());
+        self.0.insert(path.to_owned(), Arc::clone(&table));
+        Ok(table)
     }
 }

@@ -1,7 +1,5 @@
 //! Reflection models → [`MaterialKind`] and [`Surface`].
 
-use std::sync::Arc;
-
 use glam::Vec3;
 
 use super::{
@@ -20,7 +18,6 @@ use crate::{
     import::media,
     material::{ConductorFresnel, MaterialKind, Opacity, Surface},
     math::colour::luminance,
-    measured::MeasuredTable,
     texture::TextureUse,
 };
 
@@ -182,17 +179,7 @@ impl Reader {
             return Err(parameters.node.error("measured: expected the parameter `filename`"));
         };
         let path = parameters.node.file(name)?;
-        let table = match self.tables.get(&path) {
-            Some(table) => Arc::clone(table),
-            None => {
-                let table = Arc::new(MeasuredTable::load(&path)?);
-                let named = |warning: &String| format!("{}: {warning}", path.display());
-                self.warnings.extend(table.warnings.iter().map(named));
-                self.inputs.push(path.clone());
-                self.tables.insert(path.clone(), Arc::clone(&table));
-                table
-            }
-        };
+        let table = self.measured.table(&path, &mut self.inputs, &mut self.warnings)?;
         Ok(Model::new(MaterialKind::Measured { path, table }))
     }
 

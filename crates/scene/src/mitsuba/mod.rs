@@ -40,7 +40,7 @@ use super::{
     instances::Prototype,
 };
 use crate::{
-    beside::Folder, error::Result, import::Imported, material::Material, measured::MeasuredTable,
+    beside::Folder, error::Result, import::Imported, material::Material, measured::MeasuredFiles,
     texture::TextureCache,
 };
 
@@ -48,7 +48,7 @@ use crate::{
 #[derive(Default)]
 struct Reader {
     textures: TextureCache,
-    tables: HashMap<PathBuf, Arc<MeasuredTable>>,
+    measured: MeasuredFiles,
     environment: Option<EnvironmentMap>,
     lamps: Vec<Lamp>,
     materials: Vec<Material>,

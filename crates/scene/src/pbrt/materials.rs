@@ -1,7 +1,5 @@
 //! Materials of a scene description → the nearest [`Material`]s.
 
-use std::{collections::HashMap, path::PathBuf, sync::Arc};
-
 use glam::Vec3;
 
 use super::{
@@ -20,7 +18,7 @@ use crate::{
         media,
     },
     material::{ConductorFresnel, Material, MaterialKind, Surface},
-    measured::MeasuredTable,
+    measured::MeasuredFiles,
     texture::TextureUse,
 };
 
@@ -38,7 +36,7 @@ const SOLID_IOR: (f32, f32) = (0.1, 10.0);
 pub(super) struct Materials<'a> {
     pub description: &'a Description,
     pub textures: Textures<'a>,
-    tables: HashMap<PathBuf, Arc<MeasuredTable>>,
+    measured: MeasuredFiles,
     /// Mixtures around the material that is made.
     depth: usize,
 }
@@ -52,7 +50,7 @@ struct Roughness {
 
 impl<'a> Materials<'a> {
     pub(super) fn new(description: &'a Description, textures: Textures<'a>) -> Self {
-        Self { description, textures, tables: HashMap::new(), depth: 0 }
+        Self { description, textures, measured: MeasuredFiles::default(), depth: 0 }
     }
 
     /// Makes the material that a shape takes; none for a surface that is not there.
@@ -169,17 +167,7 @@ impl<'a> Materials<'a> {
         };
         let Textures { folder, log, .. } = &mut self.textures;
         let path = folder.file(name).map_err(|message| entity.error(message))?;
-        let table = match self.tables.get(&path) {
-            Some(table) => Arc::clone(table),
-            None => {
-                let table = Arc::new(MeasuredTable::load(&path)?);
-                let named = |warning: &String| format!("{}: {warning}", path.display());
-                log.warnings.extend(table.warnings.iter().map(named));
-                log.inputs.push(path.clone());
-                self.tables.insert(path.clone(), Arc::clone(&table));
-                table
-            }
-        };
+        let table = self.measured.table(&path, &mut log.inputs, &mut log.warnings)?;
         Ok(MaterialKind::Measured { path, table })
     }
 
