@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 use glam::{DVec3, Vec3, vec3};
 use rayon::prelude::*;
 
-use crate::scene::measured::MeasuredTable;
+use crate::scene::measured::{MeasuredTable, layout::MEASURED_LEAST_VALUE};
 
 /// Elevations of the reported albedo, degrees from the normal.
 pub(crate) const ELEVATIONS_DEG: [f32; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
@@ -60,7 +60,7 @@ impl Sanity {
                 100.0 * self.largest_reciprocity_error
             ));
         }
-        if self.largest_value == 0.0 {
+        if self.largest_value < 2.0 * MEASURED_LEAST_VALUE {
             warnings.push("black at every pair of directions tried".to_owned());
         }
         warnings

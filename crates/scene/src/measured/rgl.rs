@@ -12,13 +12,12 @@ use std::{
     path::Path,
 };
 
-use glam::{DVec2, DVec3, Quat, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
     error::{Error, Result},
     measured::{
         bilinear::{self, Cell, Density, Grid},
-        layout::MEASURED_THETA_HALF_BINS,
         table::{MeasuredTable, RglTraits},
         tensor::TensorFile,
     },
@@ -52,11 +51,10 @@ pub struct AdaptiveBrdf {
     clipped_count: usize,
 }
 
-/// Reads a file and bakes [`AdaptiveBrdf::value`] on the half/difference grid, corrected along θ_h so that
-/// lines between the cells have the integral of the value: a narrow lobe would reflect 1% too much.
+/// Reads a file and bakes [`AdaptiveBrdf::value`] on the half/difference grid.
 pub fn load(path: &Path) -> Result<MeasuredTable> {
     let brdf = AdaptiveBrdf::read(path)?;
-    let mut table = MeasuredTable::tabulate(|outgoing, incident| brdf.cell(outgoing, incident))
+    let mut table = MeasuredTable::tabulate(|outgoing, incident| brdf.value(outgoing, incident))
         .map_err(|message| Error::format(path, message))?;
     table.warnings.extend(brdf.warnings());
     table.rgl = Some(brdf.traits);
@@ -185,31 +183,6 @@ impl AdaptiveBrdf {
         };
         let sum: DVec3 = (0..turns).map(both).sum();
         (sum / f64::from(turns) / f64::from(outgoing.z + incident.z)).as_vec3()
-    }
-
-    /// Value for a cell with the half vector in the plane y = 0. Lines between nodes of a function of second
-    /// difference d over the half step have d/3 too much on the mean, which each node takes off.
-    /// Anisotropic ones are left, since their mean is no narrow lobe.
-    fn cell(&self, outgoing: Vec3, incident: Vec3) -> Vec3 {
-        let own = self.value(outgoing, incident);
-        if self.traits.is_anisotropic {
-            return own;
-        }
-        let half_vector = outgoing + incident;
-        let root = (half_vector.x.atan2(half_vector.z) / FRAC_PI_2 as f32).max(0.0).sqrt();
-        let beside = |steps: f32| {
-            let moved = root + steps / MEASURED_THETA_HALF_BINS as f32;
-            let turn = Quat::from_rotation_y((moved * moved - root * root) * FRAC_PI_2 as f32);
-            let (outgoing, incident) = (turn * outgoing, turn * incident);
-            let is_above = outgoing.z > 0.0 && incident.z > 0.0;
-            is_above.then(|| self.value(outgoing, incident))
-        };
-        match [-0.5, 0.5].map(beside) {
-            [Some(before), Some(after)] => {
-                (own - (before + after - 2.0 * own) / 3.0).max(Vec3::ZERO)
-            }
-            _ => own,
-        }
     }
 
     /// Light reflected toward `outgoing` of a unit of radiance per steradian from `incident`, f·cosθ, 1/sr:
