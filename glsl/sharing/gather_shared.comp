@@ -1,5 +1,5 @@
-// Chooses among the visible shadow rays of second vertices the light that they offer, and counts what the shared
-// part of the BRDF reflects, where gather.comp has added what the whole reflects.
+// Chooses among the visible shadow rays of second vertices the light that they offer, and counts what the
+// shared part of the BRDF reflects, where gather.comp has added what the whole reflects.
 #version 460
 
 #include "frame.glsl"

@@ -1,5 +1,5 @@
-// Sums up what every path offers to the pixels of its cohort: the light that its second vertex reflects, if it
-// is the same from all sides, or else light that arrives there from one direction, chosen among all that
+// Sums up what every path offers to the pixels of its cohort: the light that its second vertex reflects, if
+// it is the same from all sides, or else light that arrives there from one direction, chosen among all that
 // the path has found. Paths that found no light have nothing to offer, and nothing is traced to them.
 #version 460
 

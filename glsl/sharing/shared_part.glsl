@@ -1,5 +1,5 @@
-// Part of a BRDF whose light the pixels of a cohort share: all but the peaks of narrow lobes, in which light that
-// one path finds says little about the next pixel.
+// Part of a BRDF whose light the pixels of a cohort share: all but the peaks of narrow lobes, in which light
+// that one path finds says little about the next pixel.
 
 #include "brdf.glsl"
 #include "reservoir.glsl"
@@ -19,8 +19,8 @@ float shared_share(vec3 value) {
     return LARGEST_SHARED_VALUE / max(LARGEST_SHARED_VALUE, largest_of(value));
 }
 
-// Counts light that a second vertex reflects from a direction by a BRDF of `value`, which is positive in every
-// channel that reflects at all, and may choose it for the other pixels.
+// Counts light that a second vertex reflects from a direction by a BRDF of `value`, which is positive in
+// every channel that reflects at all, and may choose it for the other pixels.
 void take_light(inout SecondVertex second, vec3 direction, vec3 reflected, vec3 value) {
     vec3 shared_light = shared_share(value) * reflected;
     vec3 arriving = mix(vec3(0.0), reflected / value, greaterThan(value, vec3(0.0)));

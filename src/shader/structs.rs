@@ -326,8 +326,8 @@ structs! {
         shading_normal: vec3,
         /// [`Surface::alpha`], in scenes with textures.
         alpha: float,
-        /// Radiance of a diffuse surface; else light that arrives from `incident`, to be multiplied by the value
-        /// of the shared part of the BRDF.
+        /// Radiance of a diffuse surface; else light that arrives from `incident`, to be multiplied by the
+        /// value of the shared part of the BRDF.
         radiance: vec3,
         /// [`Surface::metallic`], in scenes with textures.
         metallic: float,

@@ -110,6 +110,7 @@ impl Display {
             held: Vec::new(),
             controls: Controls::new(),
             drawn_at: Instant::now(),
+            size: [0; 2],
             is_due: false,
             is_stale: false,
             pressed: None,
@@ -149,6 +150,8 @@ struct App {
     controls: Controls,
     /// Time that the controls were drawn last.
     drawn_at: Instant,
+    /// Width and height of the window, pixels.
+    size: [u32; 2],
     /// True if they must be drawn at once.
     is_due: bool,
     /// True if the renderer has reported since.
@@ -182,10 +185,13 @@ impl App {
             .with_inner_size(size);
         let window = event_loop.create_window(attributes).map_err(|error| no_window(&error))?;
         let window = Arc::new(window);
+        // Kept, since to ask a display that is gone is a panic of winit.
+        let size: [u32; 2] = window.inner_size().into();
+        self.size = size;
         self.window = Some(Arc::clone(&window));
         let proxy = self.proxy.clone();
         let render = move || {
-            let result = render(scene, options, inputs, window, proxy.clone());
+            let result = render(scene, options, inputs, (window, size), proxy.clone());
             let _ = proxy.send_event(Report::Ended);
             result
         };
@@ -233,10 +239,11 @@ impl App {
 
     /// Draws the controls anew.
     fn refresh(&mut self) {
-        let Some(window) = &self.window else { return };
-        let size = window.inner_size();
+        if self.window.is_none() {
+            return;
+        }
         (self.is_due, self.is_stale, self.drawn_at) = (false, false, Instant::now());
-        for input in self.controls.refresh([size.width, size.height]) {
+        for input in self.controls.refresh(self.size) {
             self.give(input);
         }
     }
@@ -279,7 +286,7 @@ impl App {
             self.pressed = None;
         }
         let from = self.pointer.replace(to).unwrap_or(to);
-        let height = self.window.as_ref().map_or(1, |window| window.inner_size().height.max(1));
+        let height = self.size[1].max(1);
         let way = [0, 1].map(|axis| ((to[axis] - from[axis]) / f64::from(height)) as f32);
         let input = match self.buttons.first() {
             None if self.controls.wants_pointer() => return,
@@ -331,7 +338,8 @@ impl ApplicationHandler<Report> for App {
         match event {
             WindowEvent::CloseRequested | WindowEvent::Destroyed => self.send(Input::Close),
             WindowEvent::Resized(size) => {
-                self.send(Input::Resized([size.width, size.height]));
+                self.size = size.into();
+                self.send(Input::Resized(self.size));
                 self.is_due = true;
             }
             WindowEvent::RedrawRequested => self.send(Input::Redraw),
@@ -377,7 +385,7 @@ fn render(
     scene: Scene,
     options: Options,
     inputs: Receiver<Input>,
-    window: Arc<Window>,
+    (window, size): (Arc<Window>, [u32; 2]),
     proxy: EventLoopProxy<Report>,
 ) -> Result<()> {
     let Options { device: wanted, tracer, validate, check, settings, spp, tone, folder } = options;
@@ -385,8 +393,7 @@ fn render(
     let device = Device::open_for_display(wanted.as_deref(), validate, tracer, display, check)?;
     let projector = Projector::new(&device, [scene.film.width, scene.film.height], inset::SIZE)?;
     let left = Side::new(&device, &scene, None, &settings, None)?;
-    let size = window.inner_size();
-    let panel = Panel::new(&device, window, [size.width, size.height], projector, inputs, tone)?;
+    let panel = Panel::new(&device, window, size, projector, inputs, tone)?;
     let panel = Rc::new(RefCell::new(panel));
     let announce = Box::new(move |status| {
         let _ = proxy.send_event(Report::Status(Box::new(status)));

@@ -177,7 +177,7 @@ pub(crate) struct IncludeKeys {
     /// Materials of the scene in place of materials of the file: `{ glass = "pane" }`.
     #[serde(default)]
     pub materials: BTreeMap<String, String>,
-    /// Group of the light of its lamps and of its surfaces that emit. Default: lamps.
+    /// Group of all its light. Default: lamps.
     pub light_group: Option<String>,
 }
 

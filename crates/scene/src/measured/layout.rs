@@ -29,6 +29,6 @@ pub const MEASURED_DENSITY_OFFSET: u32 =
 /// Grid cells, two words each: halves red and green, half blue.
 pub const MEASURED_GRID_OFFSET: u32 =
     MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
-/// Least value of a cell, 1/sr: where a BRDF reflects nothing at all, light found for one direction could not be
-/// shared with others (`glsl/sharing/shared_part.glsl`). A half holds it exactly.
+/// Least value of a cell, 1/sr: where a BRDF reflects nothing at all, light found for one direction could
+/// not be shared with others (`glsl/sharing/shared_part.glsl`). A half holds it exactly.
 pub const MEASURED_LEAST_VALUE: f32 = 1.0 / (1 << 20) as f32;

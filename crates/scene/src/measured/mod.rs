@@ -49,8 +49,8 @@ impl MeasuredTable {
 pub(crate) struct MeasuredFiles(HashMap<PathBuf, Arc<MeasuredTable>>);
 
 impl MeasuredFiles {
-    /// Returns the table of a file. The first time, adds the file to `inputs`, and its warnings by its name. Fails
-    /// as [`MeasuredTable::load`].
+    /// Returns the table of a file. The first time, adds the file to `inputs`, and its warnings by its name.
+    /// Fails as [`MeasuredTable::load`].
     pub(crate) fn table(
         &mut self,
         path: &Path,
