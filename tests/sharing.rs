@@ -179,6 +179,11 @@ fn the_same_seed_gives_the_same_bits_however_samples_are_grouped() {
     // Direct light has no second vertices.
     let direct = |edge| render(&scene, settings(Sampler::Mis, edge, 1), &[2]);
     assert!(direct("off") == direct("8"));
+    // Nor does a mirror reflect what another pixel could use.
+    let mirror = MaterialKind::Mirror { reflectance: Vec3::splat(0.9) };
+    let mirrors = scenes::room(vec![Material::new("mirror", mirror)]);
+    let reflected = |edge| render(&mirrors, settings(Sampler::Mis, edge, 2), &[2]);
+    assert!(reflected("off") == reflected("8"));
     let bounced = |edge| render(&scene, settings(Sampler::Mis, edge, 2), &[2]);
     assert!(bounced("off") != bounced("8"));
 }

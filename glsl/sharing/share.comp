@@ -1,6 +1,6 @@
 // Adds the light of all second vertices of the cohort that its first vertex sees to every path, each by
-// its weight. All of a vertex that its own first vertex does not see stays with its own path, and so does
-// what narrow lobes reflect.
+// its weight. All of a vertex that its own first vertex does not see stays with its own path, and so do
+// the peaks of narrow lobes.
 #version 460
 
 #include "load.glsl"

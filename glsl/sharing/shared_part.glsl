@@ -4,8 +4,8 @@
 #include "brdf.glsl"
 #include "reservoir.glsl"
 
-// Value above which a BRDF is not shared, 1/sr: half that of a lobe of GGX with a roughness of 0.1 and a
-// reflectance of 1 in the direction of its mirror image.
+// Value above which a BRDF is not shared, 1/sr: half the peak of a lobe of GGX with α = 0.1 and a reflectance
+// of 1, seen along the normal.
 const float LARGEST_SHARED_VALUE = 4.0;
 // Added to that value where light is chosen for other pixels, which may see more of it, 1/sr.
 const float BROAD_VALUE = 0.1;

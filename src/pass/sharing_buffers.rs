@@ -21,10 +21,18 @@ pub(crate) struct SharingBuffers {
 impl SharingBuffers {
     /// Adds what cohorts of so many pixels take for a path to `demand`.
     pub(crate) fn demand(demand: PathDemand, cohort_pixels: u32) -> PathDemand {
+        if cohort_pixels == 1 {
+            return demand;
+        }
         let connections = u64::from(cohort_pixels);
+        let vertex = size_of::<SecondVertex>().max(size_of::<Offer>());
+        let texels = size_of::<Offer>().max(size_of::<FirstVertex>()) / size_of::<[u32; 4]>();
         PathDemand {
-            bytes: demand.bytes.max(connections * size_of::<Connection>() as u64),
-            texels: demand.texels.max(connections),
+            bytes: demand
+                .bytes
+                .max(vertex as u64)
+                .max(connections * size_of::<Connection>() as u64),
+            texels: demand.texels.max(texels as u64).max(connections),
             ..demand
         }
     }
