@@ -280,7 +280,7 @@ mod tests {
 
     use super::*;
 
-    /// A lobe as narrow as a few bins, seen along the normal: lines between its nodes would reflect 1% too much.
+    /// A lobe of a few bins, seen along the normal: lines between its nodes would reflect 1.7% too much.
     #[test]
     fn a_narrow_lobe_reflects_what_its_function_does() {
         let lobe = |half_angle: f32| Vec3::splat((-(half_angle / 0.01).powi(2)).exp());
