@@ -154,6 +154,8 @@ mod tests {
             let ends = [mesh.positions[0][1], mesh.positions[mesh.positions.len() - 1][1]];
             assert!((f64::from(ends[0]) - first).abs() < 1e-5, "{basis:?} {ends:?}");
             assert!((f64::from(ends[1]) - last).abs() < 1e-5, "{basis:?} {ends:?}");
+            let along: Vec<f32> = mesh.uvs[0].iter().map(|uv| uv[0]).collect();
+            assert_eq!([along[0], along[along.len() - 1]], [0.0, 1.0], "{basis:?}");
             let mut area = 0.0;
             for triangle in &mesh.triangles {
                 let [a, b, c] = triangle.map(|at| Vec3::from(mesh.positions[at as usize]));

@@ -78,8 +78,15 @@ fn document(channels: &str, samplers: &str) -> String {
                 let mut index = 0;
                 move |_: f32| {
                     index += 1;
-                    // The value of the second key is 3 along X, the slope after the first 2.
-                    f32::from(u8::from(index == 13)) * 3.0 + f32::from(u8::from(index == 7)) * 2.0
+                    // Along X, the slope after the first key is 2; the second has the slope 8 before
+                    // it, the value 3 and the slope 4 after it.
+                    match index {
+                        7 => 2.0,
+                        10 => 8.0,
+                        13 => 3.0,
+                        16 => 4.0,
+                        _ => 0.0,
+                    }
                 }
             })),
         ),
@@ -117,9 +124,10 @@ fn nodes_of_a_gltf_file_move() {
     assert_eq!(corner(linear, Some(3.0)), Vec3::new(4.0, 0.0, 4.0));
     assert_eq!(corner(linear, Some(5.0)), Vec3::new(8.0, 0.0, 4.0));
     assert_eq!(corner(&shifts("STEP"), Some(3.0)), Vec3::new(0.0, 0.0, 4.0));
-    // Hermite halfway: half of the end, and an eighth of the slope.
+    // Hermite halfway: half of the ends, and an eighth of the slopes' difference times the seconds.
     let cubic = r#"{"input": 1, "output": 4, "interpolation": "CUBICSPLINE"}"#;
-    assert_eq!(corner(cubic, Some(1.5)), Vec3::new(1.5 + 0.25, 0.0, 0.0));
+    assert_eq!(corner(cubic, Some(1.5)), Vec3::new(1.5 + 0.25 - 1.0, 0.0, 0.0));
+    assert_eq!(corner(cubic, Some(3.0)), Vec3::new(1.5 + 1.0, 0.0, 0.0));
 
     // A quarter turn about Y, by the shorter way although the quaternions have opposite signs.
     let turns = r#"{"input": 1, "output": 3}"#;

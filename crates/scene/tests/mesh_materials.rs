@@ -54,7 +54,8 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
     );
     let material = r#"{"name": "wood", "alphaMode": "MASK", "alphaCutoff": 0.3, "doubleSided": true,
         "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.6, 0.4, 0.9], "metallicFactor": 0.25,
-            "roughnessFactor": 0.5, "baseColorTexture": {"index": 0},
+            "roughnessFactor": 0.5, "baseColorTexture": {"index": 0, "texCoord": 1,
+                "extensions": {"KHR_texture_transform": {"texCoord": 0}}},
             "metallicRoughnessTexture": {"index": 1, "texCoord": 1}},
         "normalTexture": {"index": 1, "scale": 0.5}, "occlusionTexture": {"index": 1},
         "emissiveFactor": [1, 0.5, 0], "emissiveTexture": {"index": 0},
@@ -369,7 +370,7 @@ fn morph_targets_move_vertices_by_their_weights() {
 #[test]
 fn joints_carry_the_vertices_of_a_skin() {
     let shift = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
-    let twice = [2.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let twice = [2.0, 0.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0];
     let joints = vec![0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0];
     let weights = [1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0];
     let attributes = [
@@ -377,6 +378,8 @@ fn joints_carry_the_vertices_of_a_skin() {
         Attribute("JOINTS_0", 5121, "VEC4", false, joints),
         Attribute("WEIGHTS_0", 5126, "VEC4", false, floats(&weights)),
         Attribute("_BINDS", 5126, "MAT4", false, floats(&[shift, twice, twice].concat())),
+        Attribute("NORMAL", 5126, "VEC3", false, floats(&[0.6, 0.8, 0.0].repeat(3))),
+        Attribute("TANGENT", 5126, "VEC4", false, floats(&[0.8, -0.6, 0.0, -1.0].repeat(3))),
     ];
     let skins = r#", "skins": [{"joints": [1, 2], "inverseBindMatrices": 3}]"#;
     let nodes = r#""nodes": [{"mesh": 0, "skin": 0, "translation": [9, 9, 9]},
@@ -388,6 +391,11 @@ fn joints_carry_the_vertices_of_a_skin() {
     let read = |text: String| Mesh::read(&folder.write("a.gltf", text), &mut Vec::new());
     let mesh = read(text.clone()).unwrap();
     assert_eq!(mesh.positions, [[2.0, 1.0, 0.0], [3.5, 0.5, 2.0], [2.0, 2.0, 0.0]]);
+    // The second vertex is stretched by 1.5 and by 2.5: its normal still stands on its tangent.
+    let unit = |[x, y, z]: [f32; 3]| Vec3::new(x, y, z).normalize();
+    assert!(close(unit(mesh.normals[1]), unit([0.6 / 1.5, 0.8 / 2.5, 0.0]).to_array()));
+    let [x, y, z, sign] = mesh.tangents[1];
+    assert!(close(unit([x, y, z]), unit([0.8 * 1.5, -0.6 * 2.5, 0.0]).to_array()) && sign == -1.0);
     let found = read(text.replace("[1, 2], \"inverse", "[1], \"inverse")).unwrap_err().to_string();
     assert!(found.contains("vertex 1: joint 1 is out of range, the skin has 1"), "{found}");
 }

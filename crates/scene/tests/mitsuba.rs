@@ -372,6 +372,10 @@ fn principled_becomes_the_material_of_gltf() {
     let MaterialKind::Dielectric { ior, alpha, transmittance, .. } = glass.kind else { panic!() };
     assert_eq!((ior, alpha, transmittance), (1.3, 0.25, Vec3::splat(0.5)));
     assert_eq!(warnings, [""; 0]);
+    // Neither `eta` nor `specular`: that of 0.5.
+    let (plain, _) = material(r#"<bsdf type="principled"/>"#);
+    let MaterialKind::Principled(Principled { ior, roughness, .. }) = plain.kind else { panic!() };
+    assert!((ior - 1.5).abs() < 1e-6 && roughness == 0.5, "{ior} {roughness}");
 }
 
 #[test]
@@ -410,6 +414,7 @@ fn textures_keep_their_coordinates() {
         <bsdf type="diffuse"><texture type="bitmap" name="reflectance">
           <string name="filename" value="./four colours.png"/>
           <string name="filter_type" value="nearest"/>
+          <string name="wrap_mode_v" value="mirror"/>
           <transform name="to_uv"><scale x="2" y="1"/><translate x="0.1" y="0.2"/></transform>
           </texture></bsdf></bsdf></shape>
         <shape type="rectangle"><bsdf type="diffuse"><texture type="checkerboard" name="reflectance">
@@ -424,7 +429,7 @@ fn textures_keep_their_coordinates() {
     // Mitsuba's (0, 0) is the upper left corner, as that of TextureUse.
     assert_eq!(color.image_from_uv, [[2.0, 0.0, 0.1], [0.0, 1.0, 0.2]]);
     assert_eq!((color.encoding, color.interpolation), (Encoding::Srgb, Interpolation::Nearest));
-    assert_eq!(color.wrap, [Wrap::Repeat; 2]);
+    assert_eq!(color.wrap, [Wrap::Repeat, Wrap::Mirror]);
     assert!(matches!(leaf.kind, MaterialKind::Diffuse { reflectance: Vec3::ONE }));
     let opacity = leaf.surface.opacity.texture.as_ref().unwrap();
     assert_eq!((opacity.encoding, opacity.wrap), (Encoding::Linear, [Wrap::Clamp; 2]));
@@ -841,6 +846,13 @@ fn daylight_stands_where_mitsuba_has_it() {
     }
     let found = brightest(&sky(upright, "3.0.0"));
     assert!(found.dot(DEFAULT_SUN) > 0.9999, "{found}");
+    let clock = |hour: u32, minute: u32, second: u32| {
+        [("hour", hour), ("minute", minute), ("second", second)]
+            .map(|(name, value)| format!("<float name=\"{name}\" value=\"{value}\"/>"))
+            .concat()
+    };
+    let found = brightest(&sky(&format!("{upright}{}", clock(14, 30, 1800)), "3.0.0"));
+    assert!(found.dot(DEFAULT_SUN) > 0.9999, "{found}: an hour in three parts");
 }
 
 /// The zenith of version 0.6 is +Y, and its north −Z, as those of scene files.

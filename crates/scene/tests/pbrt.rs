@@ -229,6 +229,14 @@ fn quadrics_and_patches_face_outward() {
     );
     let top = sphere.geometry.positions.iter().position(|position| position[2] > 0.999).unwrap();
     assert!(sphere.geometry.uvs[0][top][1] > 0.9);
+    // That of a ring runs from 0 at its rim to 1 at its hole.
+    let ring = world(
+        r#"Texture "t" "spectrum" "checkerboard"
+        Material "diffuse" "texture reflectance" "t" Shape "disk" "float innerradius" 0.5"#,
+    );
+    for ([x, y, _], [_, v]) in ring.geometry.positions.iter().zip(&ring.geometry.uvs[0]) {
+        assert!((x.hypot(*y) - (1.0 - 0.5 * v)).abs() < 1e-4, "{x} {y} {v}");
+    }
 }
 
 #[test]
@@ -397,6 +405,10 @@ fn images_are_scaled_inverted_mixed_and_placed() {
         r#"Texture "t" "spectrum" "mix" "texture tex1" "a" "rgb tex2" [1 0 0.5] "float amount" 0.25"#,
     );
     assert_eq!((mixed.scale, mixed.bias), ([0.75; 3], [0.25, 0.0, 0.125]));
+    let mixed = color(
+        r#"Texture "t" "spectrum" "mix" "rgb tex1" [1 0 0.5] "texture tex2" "a" "float amount" 0.25"#,
+    );
+    assert_eq!((mixed.scale, mixed.bias), ([0.25; 3], [0.75, 0.0, 0.375]));
     let board = color(
         r#"Texture "t" "spectrum" "checkerboard" "rgb tex1" [1 0 0] "rgb tex2" [0 1 0] "float uscale" 8"#,
     );
@@ -470,10 +482,14 @@ fn lamps_have_their_places_and_powers() {
     // A plain camera mirrors the world in z.
     let far = load(VIEW, r#"LightSource "point" "point3 from" [0 0 4]"#);
     assert!(matches!(far.lamps[0].kind, LampKind::Point { position, .. } if position.z == -4.0));
-    // The disk has the area π, and one side.
-    let area = world(r#"AreaLightSource "diffuse" "float power" 3 Shape "disk""#);
-    let radiance = area.materials[0].surface.emission.as_ref().unwrap().radiance.x;
-    assert!((radiance * std::f32::consts::PI.powi(2) - 3.0).abs() < 0.01, "{radiance}");
+    // The disk has the area π, and one side or two.
+    for (sides, two_sided) in [(1.0, "false"), (2.0, "true")] {
+        let light = format!(r#""diffuse" "float power" 3 "bool twosided" {two_sided}"#);
+        let area = world(&format!(r#"AreaLightSource {light} Shape "disk""#));
+        let radiance = area.materials[0].surface.emission.as_ref().unwrap().radiance.x;
+        let power = sides * radiance * std::f32::consts::PI.powi(2);
+        assert!((power - 3.0).abs() < 0.01, "{radiance}");
+    }
 }
 
 #[test]

@@ -118,6 +118,24 @@ fn an_anisotropic_file_is_averaged_with_a_warning() {
     let brdf = read(&fields);
     assert!(brdf.warnings()[0].starts_with("anisotropic"), "{:?}", brdf.warnings());
     assert_eq!(brdf.traits, RglTraits { is_anisotropic: true, is_spectral: false });
+    assert_is_mean(&brdf);
+    // Of a surface that half a turn changes, whole turns count.
+    let azimuths: Vec<f64> = (0..13).map(|index| TAU * f64::from(index) / 12.0 - PI).collect();
+    let mut lopsided = fields;
+    for field in lopsided.iter_mut().filter(|field| field.0 == "rgb") {
+        let slice = field.3.len() / azimuths.len();
+        for (values, azimuth) in field.3.chunks_exact_mut(slice).zip(&azimuths) {
+            for bytes in values.as_chunks_mut().0 {
+                let value = f32::from_le_bytes(*bytes) * (1.0 + 0.2 * azimuth.cos() as f32);
+                *bytes = value.to_le_bytes();
+            }
+        }
+    }
+    assert_is_mean(&read(&replaced(&lopsided, floats("phi_i", &[13], &azimuths))));
+}
+
+/// Fails unless the value of a BRDF is its mean over all turns.
+fn assert_is_mean(brdf: &AdaptiveBrdf) {
     for [theta_i, _, theta_o, phi] in PAIRS {
         let value = |turn: f64| {
             let [wi, wo] = pair([theta_i, turn, theta_o, phi + turn]);

@@ -78,5 +78,8 @@ mod tests {
         let rising = [0.0, 1.0, 5.0, 6.0];
         let slope = |from: f32| (curve(rising, from + 1e-3) - curve(rising, from)) / 1e-3;
         assert!((slope(1.0) - slope(1.0 - 1e-3)).abs() < 0.05, "{} {}", slope(1.0), slope(0.999));
+        // By the lengths of both stretches: 1 s at 1 per second, then 0.5 s at 8.
+        let expected = 3.0 * 1.5 / ((2.0 * 0.5 + 1.0) / 1.0 + (0.5 + 2.0 * 1.0) / 8.0);
+        assert!((slope(1.0) - expected).abs() < 0.05, "{} {expected}", slope(1.0));
     }
 }
