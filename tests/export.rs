@@ -9,7 +9,7 @@ use fenestra::{
     film::Image,
     scene::{
         Scene,
-        export::{Settings, mitsuba::export},
+        export::{Settings, mitsuba::export, pbrt},
         lamp::LampKind,
         material::MaterialKind,
         measured::{MeasuredTable, RglTraits},
@@ -355,6 +355,16 @@ fn surfaces_keep_sides_opacity_and_bumps() {
         );
     }
 
+    // Coordinates that mirror the image turn its bitangent.
+    let (folder, _, _, [mut mirrored, _]) = both(&diffuse(bumps), "");
+    mirrored.geometry.uvs[0].iter_mut().for_each(|uv| uv[0] = 1.0 - uv[0]);
+    export(&mirrored, &folder.path().join("out.xml"), SETTINGS).write().unwrap();
+    let read = Scene::load(&folder.path().join("out.xml")).unwrap();
+    let uv = Vec2::new(0.3, 0.7);
+    let expected = Vec3::new(2.0, -2.0, 1.0) * (2.0 * value_at(&map(&mirrored), uv) - 1.0);
+    let found = 2.0 * value_at(&map(&read), uv) - 1.0;
+    assert!(found.normalize().abs_diff_eq(expected.normalize(), 1e-3), "{found} {expected}");
+
     let cut = "opacity = { texture = \"four colours.png\", interpolation = \"nearest\" }\n\
                opacity_cutoff = 0.5";
     let (_, _, warnings, [_, read]) = both(&diffuse(cut), "");
@@ -408,6 +418,50 @@ fn surfaces_emit_on_the_sides_that_the_scene_says() {
     let glass = "type = \"dielectric\"\nemission = [1, 2, 3]\nemission_two_sided = true";
     let (_, _, warnings, _) = both(glass, "");
     assert!(matches!(&warnings[..], [one] if one.contains("light of the back")), "{warnings:?}");
+}
+
+/// Three images that lie in three ways on one mesh, and a film that is higher than wide.
+#[test]
+fn pbrt_shows_every_image_where_the_scene_does() {
+    let folder = Folder::new();
+    write_square(&folder);
+    let image = |rest: &str| format!("{{ texture = \"four colours.png\", {rest} }}");
+    let clay = format!(
+        "type = \"conductor\"\nreflectance = {}\nroughness = {}\nopacity = {}",
+        image("scale = [0.9, 0.8], offset = [0.3, 0.1]"),
+        image(
+            "channel = \"g\", interpolation = \"nearest\", scale = [0.4, 0.7], offset = [0.15, 0.12]"
+        ),
+        image("channel = \"r\", scale = [0.5, 0.3], offset = [0.2, 0.4]"),
+    );
+    let text = yard([6, 8], "constant = [0, 0, 0]", &clay, "mesh = \"square.obj\"");
+    let mut ours = Scene::load(&folder.write("scene.toml", text)).unwrap();
+    ours.materials[0].surface.opacity.factor = 0.5;
+    let path = folder.path().join("out.pbrt");
+    pbrt::export(&ours, &path, SETTINGS).write().unwrap();
+    let read = Scene::load(&path).unwrap();
+    let [expected, found] = [&ours, &read].map(|scene| scene.camera.vertical_fov_deg);
+    assert!((found - expected).abs() < 1e-3, "{found}, expected {expected}");
+    let vertex = |scene: &Scene, index: usize| {
+        let uv = Vec2::from(scene.geometry.uvs[0][index]);
+        let kind = &scene.materials[0].kind;
+        let MaterialKind::Conductor { alpha, .. } = kind else { unreachable!("{kind:?}") };
+        let surface = &scene.materials[0].surface;
+        [
+            value_at(surface.color.as_ref().unwrap(), uv),
+            alpha.sqrt() * value_at(surface.roughness.as_ref().unwrap(), uv),
+            surface.opacity.factor * value_at(surface.opacity.texture.as_ref().unwrap(), uv),
+        ]
+    };
+    let positions =
+        |scene: &Scene| scene.geometry.positions.iter().map(|p| Vec3::from(*p)).collect();
+    let [ours_at, read_at]: [Vec<Vec3>; 2] = [&ours, &read].map(positions);
+    for (index, place) in ours_at.iter().enumerate() {
+        let other = read_at.iter().position(|other| other.abs_diff_eq(*place, 1e-5)).unwrap();
+        for (expected, found) in vertex(&ours, index).into_iter().zip(vertex(&read, other)) {
+            assert!(found.abs_diff_eq(expected, 2e-3), "at {place}: {found}, expected {expected}");
+        }
+    }
 }
 
 #[test]

@@ -512,7 +512,6 @@ fn bumps_keep_their_side_in_mirrors_and_from_behind() {
             }
         }
     }
-    scene.geometry = geometry;
     (scene.film.width, scene.film.height) = (6, 2);
     let look_at = Vec3::new(2.5, -0.5, 0.0);
     scene.camera = Camera {
@@ -522,15 +521,19 @@ fn bumps_keep_their_side_in_mirrors_and_from_behind() {
         ..scene.camera
     };
     let settings = Settings { shadow_rays: 0, aovs: vec![Aov::Normal], ..Settings::default() };
-    let (sums, _) = support::render(&scene, settings, 1);
-    for (pixel, normal) in sums.normal.iter().enumerate() {
-        let (name, _, signs) = cases[pixel % 6];
-        let (found, expected) = (Vec3::from(*normal), signs * bump);
-        assert!(
-            found.distance(expected) < 1e-3,
-            "{name}, row {}: {found}, not {expected}",
-            pixel / 6
-        );
+    // The same scene placed flat has the same bumps.
+    for geometry in [geometry.clone(), geometry.flattened().unwrap()] {
+        scene.geometry = geometry;
+        let (sums, _) = support::render(&scene, settings.clone(), 1);
+        for (pixel, normal) in sums.normal.iter().enumerate() {
+            let (name, _, signs) = cases[pixel % 6];
+            let (found, expected) = (Vec3::from(*normal), signs * bump);
+            assert!(
+                found.distance(expected) < 1e-3,
+                "{name}, row {}: {found}, not {expected}",
+                pixel / 6
+            );
+        }
     }
 }
 
@@ -545,10 +548,11 @@ fn rays_go_through_each_of_several_sheets() {
     scene.materials.push(sheet);
     let mut quad = Geometry::default();
     add_quad(&mut quad, Vec3::ZERO, [5e3 * Vec3::X, 5e3 * Vec3::NEG_Z], false);
+    quad.materials.fill(1);
     scene.geometry.prototypes = vec![quad];
-    for (height, replaces) in [(8.0, false), (9.0, true), (10.0, true)] {
+    for (height, first_material, replaces) in [(8.0, 0, false), (9.0, 1, true), (10.0, 1, true)] {
         let place = Transform::new([1.0; 3], [0.0; 3], [0.0, height, 0.0]);
-        scene.geometry.instances.extend(Instance::new(0, &place, 1, replaces));
+        scene.geometry.instances.extend(Instance::new(0, &place, first_material, replaces));
     }
     let settings = Settings { sampler: Sampler::Cosine, ..Settings::default() };
     // A ray that leaves the scene between two sheets is one in 10⁵.

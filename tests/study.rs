@@ -11,6 +11,7 @@ use fenestra::{
     scene::Scene,
     study::{
         file::{StudyFile, ValueParsers, is_study},
+        metrics::Metrics,
         plan::{Options, Plan},
     },
 };
@@ -588,6 +589,18 @@ fn references_can_be_given() {
     let results: Value = serde_json::from_str(&text).unwrap();
     let single = &results["scenes"][0]["reference"];
     assert!(single["mse"].as_f64().unwrap() > own["mse"].as_f64().unwrap());
+    // The error of a mean of two is half their difference, and that of its mean less by the root of 2.
+    let [a, b] = ["a.exr", "b.exr"].map(|name| {
+        let path = folder.path().join(name);
+        Image::read_exr(&path).unwrap().rgb(&path).unwrap()
+    });
+    let halves = Metrics::of_halves(&a, &b, &b).unwrap();
+    for (name, difference) in [("mse", halves.mse), ("relmse", halves.relmse)] {
+        let found = own[name].as_f64().unwrap();
+        assert!((found / (0.25 * difference) - 1.0).abs() < 1e-6, "{name}: {found} {difference}");
+    }
+    let [single_error, both] = [single, &own].map(|of| of["mean_standard_error"].as_f64().unwrap());
+    assert!((both * 2_f64.sqrt() / single_error - 1.0).abs() < 0.05, "{both} {single_error}");
     assert!(single["relmse"].is_null());
 
     // Take the references of another study.

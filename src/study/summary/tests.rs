@@ -98,6 +98,11 @@ fn what_drowns_in_the_references_noise_is_not_judged() {
     let all = summaries(&plan(), &[scene(0.5)], &runs());
     assert!(all[2].mse_judged && !all[3].mse_judged);
     assert_eq!((all[3].rmse_ratio, all[3].efficiency), (None, None));
+    // Nor is a ratio to what drowns.
+    let swapped = [run("mis", 1, 2.0), run("ris", 1, 8.0), run("mis", 2, 4.0), run("ris", 2, 16.0)];
+    let all = summaries(&plan(), &[scene(0.5)], &swapped);
+    assert!(!all[2].mse_judged && all[3].mse_judged);
+    assert_eq!((all[3].rmse_ratio, all[3].efficiency), (None, None));
     let all = summaries(&plan(), &[scene(0.75 / 4.0)], &runs());
     assert!(all[3].mse_judged && all[3].rmse_ratio.is_some());
 }
@@ -112,6 +117,7 @@ fn independent_samples_have_a_slope_of_minus_one_half() {
         assert!((curve.slope_seconds.unwrap() + 0.5).abs() < 1e-9);
         for CurvePoint { rmse, .. } in &curve.points {
             assert!(rmse.low < rmse.middle && rmse.middle < rmse.high);
+            assert!((rmse.low * rmse.high / rmse.middle.powi(2) - 1.0).abs() < 1e-9, "{rmse:?}");
         }
     }
     // 12/n falls below 4·0.8 after the second point.
