@@ -456,7 +456,8 @@ fn pbrt_shows_every_image_where_the_scene_does() {
     let positions =
         |scene: &Scene| scene.geometry.positions.iter().map(|p| Vec3::from(*p)).collect();
     let [ours_at, read_at]: [Vec<Vec3>; 2] = [&ours, &read].map(positions);
-    for (index, place) in ours_at.iter().enumerate() {
+    // The square stands at z = 0, unlike the corners of the floor.
+    for (index, place) in ours_at.iter().enumerate().filter(|(_, place)| place.z == 0.0) {
         let other = read_at.iter().position(|other| other.abs_diff_eq(*place, 1e-5)).unwrap();
         for (expected, found) in vertex(&ours, index).into_iter().zip(vertex(&read, other)) {
             assert!(found.abs_diff_eq(expected, 2e-3), "at {place}: {found}, expected {expected}");
