@@ -7,7 +7,8 @@ use std::{collections::BTreeMap, fs, io, path::Path};
 use clap::ValueEnum;
 use fenestra::{
     film::{
-        Aov, Attribute, Checkpoint, Image, Metadata, RgbImage, SampleRange, Sums, Window,
+        Aov, Attribute, Checkpoint, GroupSums, Image, Metadata, RgbImage, SampleRange, Sums,
+        Window,
         checkpoint::checkpoint_path,
         merge::{Part, join_windows, merge_checkpoints, merge_images},
         png,
@@ -189,10 +190,19 @@ fn the_first_blocks_have_the_samples_of_a_stopped_sweep() {
     // A constant picture stays constant, by whatever part of a sample a pixel has.
     sums.sum.fill([4.0; 3]);
     sums.pending = (0..192).map(|pixel| [(sums.samples(pixel) - 4) as f32; 3]).collect();
+    // A group of lights brings a quarter of it.
+    let quarter = |of: &[[f32; 3]]| of.iter().map(|value| value.map(|v| 0.25 * v)).collect();
+    let group = GroupSums {
+        name: "lamps".into(),
+        sum: quarter(&sums.sum),
+        compensation: vec![[0.0; 3]; 192],
+        pending: quarter(&sums.pending),
+    };
     for offset in [None, Some([-0.4, 0.3])] {
         sums.ahead.offset = offset;
         for pixel in 0..192 {
             assert!((sums.mean(pixel)[1] - 1.0).abs() < 1e-12, "pixel {pixel}");
+            assert!((sums.group_mean(&group, pixel)[1] - 0.25).abs() < 1e-12, "pixel {pixel}");
         }
     }
 }

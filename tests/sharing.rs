@@ -128,33 +128,50 @@ fn with_lamps_panes_mirrors_and_sheets() {
 }
 
 /// A wall stands on the floor, and its normals are bent toward it: from near it looks brighter than its area
-/// tells, and from far darker.
+/// tells, and from far darker. Bent the other way, they are turned for paths from near alone.
 #[test]
 fn before_a_wall_of_bent_normals() {
     let _alone = support::alone();
+    for bend_deg in [40_f32, -40.0] {
+        agrees(&wall(bend_deg), &[(Sampler::Mis, "8")], 64, &base(2));
+    }
+}
+
+fn wall(bend_deg: f32) -> Scene {
     let mut scene = scenes::plane(Vec3::splat(0.7), scenes::environment(16, |_| Vec3::ZERO));
     let first = scene.geometry.positions.len();
     scenes::add_box(&mut scene.geometry, Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.02, 2.0, 6.0), 0);
-    let (sine, cosine) = 40_f32.to_radians().sin_cos();
+    let (sine, cosine) = bend_deg.to_radians().sin_cos();
     scene.geometry.normals[first..].fill([cosine, -sine, 0.0]);
     for x in [-2.5, 2.5] {
         let kind =
             LampKind::Point { position: Vec3::new(x, 1.0, 0.0), intensity: Vec3::splat(20.0) };
         scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
     }
-    scene.name = "wall".into();
-    agrees(&scene, &[(Sampler::Mis, "8")], 64, &base(2));
+    scene.name = format!("wall bent by {bend_deg}°");
+    scene
 }
 
+/// A white surface whose values come from a table shares light by direction, and is nearly as white.
 #[test]
 fn a_concave_white_body_vanishes_in_the_furnace() {
     let _alone = support::alone();
-    let scene = scenes::concave_furnace();
-    let settings = Settings { roulette: Roulette::NEVER, ..settings(Sampler::Cosine, "4", 24) };
-    let (sums, _) = support::render(&scene, settings, 64);
-    let pixels = sums.pixel_count();
-    let mean = (0..pixels).map(|pixel| sums.mean(pixel)[1]).sum::<f64>() / pixels as f64;
-    assert!((mean - 1.0).abs() < 4e-3, "{mean}");
+    let mut scene = scenes::concave_furnace();
+    let table = MeasuredTable::tabulate(|_, _| Vec3::splat(std::f32::consts::FRAC_1_PI)).unwrap();
+    let measured = MaterialKind::Measured { path: "white".into(), table: Arc::new(table) };
+    let mean = |scene: &Scene, edge| {
+        let settings = settings(Sampler::Cosine, edge, 24);
+        let settings = Settings { roulette: Roulette::NEVER, ..settings };
+        let (sums, _) = support::render(scene, settings, 64);
+        let pixels = sums.pixel_count();
+        (0..pixels).map(|pixel| sums.mean(pixel)[1]).sum::<f64>() / pixels as f64
+    };
+    let shared = mean(&scene, "4");
+    assert!((shared - 1.0).abs() < 4e-3, "{shared}");
+    scene.materials[0].kind = measured;
+    let (alone, shared) = (mean(&scene, "off"), mean(&scene, "4"));
+    eprintln!("measured: {alone} alone, {shared} shared");
+    assert!((shared - alone).abs() < 1e-3 && alone > 0.98, "{alone}, {shared}");
 }
 
 fn render(scene: &Scene, settings: Settings, passes: &[u32]) -> Sums {

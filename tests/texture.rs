@@ -390,10 +390,12 @@ fn materials(uses: &[TextureUse]) -> Vec<Material> {
         material.surface.normal = Some(used.clone());
         material.surface.normal_scale = 0.1 + 0.2 * (index % 7) as f32;
         material.surface.vertex_color = index % 2 == 0;
+        // An opacity that is just the cutoff is not below it.
+        let (factor, cutoff) = if index % 15 == 0 { (0.0, 0.0) } else { (0.9, 0.3) };
         material.surface.opacity = Opacity {
-            factor: 0.9,
+            factor,
             texture: (index % 3 != 0).then(|| used.clone()),
-            cutoff: (index % 5 == 0).then_some(0.3),
+            cutoff: (index % 5 == 0).then_some(cutoff),
         };
         material
     };

@@ -86,3 +86,23 @@ fn direction_of(width: usize, pixel: usize) -> Vec3 {
     let v = ((pixel / width) as f32 + 0.5) / (width / 2) as f32;
     direction_from_lat_long(Vec2::new(u, v))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sky_is_bright_above_and_dark_below_the_horizon() {
+        let white = Sky::new(64, Vec3::Y, 2.0, |_| Vec3::splat(2.0));
+        let pixel = |sky: &Sky, row: usize| sky.pixels()[64 * row + 20];
+        assert_eq!([pixel(&white, 0), pixel(&white, 12)], [[255; 3]; 2]);
+        assert_eq!(pixel(&white, 16), HORIZON);
+        assert_eq!(pixel(&white, 30), [display_from_linear(BELOW); 3]);
+        // A dot toward +X, a quarter to the right of the middle.
+        let mut marked = white;
+        marked.mark(Vec3::X.with_y(0.5), [1, 2, 3]);
+        let row = ((0.5 - 0.5_f32.atan() / std::f32::consts::PI) * 32.0) as usize;
+        assert_eq!(marked.pixels()[64 * row + 48], [1, 2, 3]);
+        assert_eq!(marked.pixels()[64 * row + 44], [0; 3], "its rim");
+    }
+}
