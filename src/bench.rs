@@ -236,7 +236,7 @@ impl<'a> Bench<'a> {
             parameters: self.scene.parameters(),
         };
         let host = self.scene.geometry().host_tracer().map(|tracer| (tracer, answers));
-        let mut recording = Recording::begin(self.device, 1, host)?;
+        let mut recording = Recording::begin(self.device, 1, host, false)?;
         recording.add(pass, &self.sets(), &self.wave)?;
         Ok(recording.finish()?.values().sum::<f64>() * 1e-3)
     }

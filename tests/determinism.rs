@@ -264,6 +264,29 @@ fn lists_of_living_paths_make_no_difference() {
 }
 
 #[test]
+fn waves_end_with_their_last_path_where_the_host_traces() {
+    let _alone = support::alone();
+    let scene = scenes::glazed_room();
+    for sampler in [Sampler::Mis, Sampler::Product, Sampler::Guided] {
+        let mut settings = Settings { depth: 40, ..settings(sampler) };
+        settings.roulette = Roulette { vertex: 1, throughput: 0.5 };
+        let render = |path_lists| {
+            let mut renderer = renderer(&scene, Settings { path_lists, ..settings.clone() });
+            renderer.render_pass(2).unwrap();
+            renderer.render_pass(2).unwrap();
+            support::assert_silent();
+            let is_on_host = renderer.tracer() != "device";
+            (renderer.sums().unwrap(), renderer.totals().passes, is_on_host)
+        };
+        let (all, most, is_on_host) = render(PathLists::Never);
+        let (sums, passes, _) = render(PathLists::WherePathsEnd);
+        let name = sampler.name();
+        assert!(sums == all, "{name} differs");
+        assert!(!is_on_host || 4 * passes < 3 * most, "{name} takes {passes} of {most} passes");
+    }
+}
+
+#[test]
 fn sums_of_another_window_are_refused() {
     let _alone = support::alone();
     let mut sums = render(settings(Sampler::Mis), &[1]);

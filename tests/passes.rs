@@ -93,7 +93,7 @@ fn haar(cache: &str) -> impl Steps {
 }
 
 fn order(settings: &PassSettings, steps: &dyn Steps, wave: Wave) -> Vec<Dispatch> {
-    wave_order(settings, steps, wave, settings.depth)
+    wave_order(settings, steps, wave, settings.depth).all()
 }
 
 /// Names of the passes in their order, separated by spaces.

@@ -68,6 +68,25 @@ pub struct Answers<'a> {
     pub parameters: &'a Buffer,
 }
 
+impl Answers<'_> {
+    /// True if any path that a pass walks has a ray to follow.
+    ///
+    /// # Errors
+    /// As [`HostTracer::answer`].
+    pub(super) fn has_rays(&self, wave: &Wave) -> Result<bool> {
+        let ListedPaths { count, list } = ListedPaths::new(wave, self.path_lists)?;
+        let rays = self.rays.words()?;
+        let is_active = |path: usize| {
+            let word = words_of::<Ray>() * path + offset_of!(Ray, is_active) / size_of::<u32>();
+            rays[word].load(Ordering::Relaxed) != 0
+        };
+        Ok(match list {
+            None => (0..count).any(is_active),
+            Some(list) => list.iter().any(|path| is_active(path.load(Ordering::Relaxed) as usize)),
+        })
+    }
+}
+
 impl HostTracer {
     /// Builds the tree over `accel`, whose triangles lie in `pages`; `passages` says what light passes, if it
     /// passes any. Instances are placed: as instances of the library, in the space of their meshes, those

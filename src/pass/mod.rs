@@ -33,7 +33,7 @@ pub use geometry::{GeometryBuffers, Schedule};
 pub use host_tracer::Answers;
 pub(crate) use kernel::Domain;
 pub use kernel::{Dispatch, Kernel, Pass};
-pub use order::{PassSettings, PathLists, wave_order};
+pub use order::{PassSettings, PathLists, WaveOrder, wave_order};
 pub use recording::Recording;
 pub use roulette::Roulette;
 pub(crate) use runner::{Runner, Watch};

@@ -24,7 +24,7 @@ pub(super) const FEATURES: u32 = AOV_ALBEDO | AOV_NORMAL | AOV_POSITION;
 const FEATURE_VERTICES: u32 = 8;
 
 /// When the passes of later vertices walk lists of the paths that are still alive. The picture is the same
-/// to the bit.
+/// to the bit. Where the host traces, waves also end with their last path, except with [`PathLists::Never`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PathLists {
     /// Where most paths end early: `docs/experiments.md`, lists_of_living_paths.
@@ -88,13 +88,28 @@ const LAST_STAGES: [fn(&mut Order); 4] = [
     |order| order.gather(order.wave),
 ];
 
+/// Dispatches of one wave.
+pub struct WaveOrder {
+    /// Those of the vertices, from the camera on.
+    pub vertices: Vec<Dispatch>,
+    /// Those that follow in any case.
+    pub end: Vec<Dispatch>,
+}
+
+impl WaveOrder {
+    /// Returns all in their order.
+    pub fn all(self) -> Vec<Dispatch> {
+        [self.vertices, self.end].concat()
+    }
+}
+
 /// Returns the dispatches of one wave for the first `vertices` vertices of its paths.
 pub fn wave_order(
     settings: &PassSettings,
     steps: &dyn Steps,
     wave: Wave,
     vertices: u32,
-) -> Vec<Dispatch> {
+) -> WaveOrder {
     let mut order = Order::new(settings, steps, wave, vertices);
     order.add(Kernel::new("camera", Domain::Paths, &[]));
     for vertex in 0..vertices {
@@ -105,11 +120,12 @@ pub fn wave_order(
         order.arrive_at(vertices);
         LAST_STAGES.iter().for_each(|stage| stage(&mut order));
     }
+    let vertices = std::mem::take(&mut order.dispatches);
     if let Some(sharing) = order.sharing {
         order.dispatches.extend(sharing.connect_and_share(&order.wave));
     }
     order.add(Kernel::new("deposit", Domain::Pixels, &[]));
-    order.dispatches
+    WaveOrder { vertices, end: order.dispatches }
 }
 
 /// The dispatches so far, and the vertex under way.

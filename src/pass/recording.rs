@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Instant};
 
 use super::{
     host_tracer::{Answers, HostTracer},
-    kernel::Pass,
+    kernel::{Pass, Question},
 };
 use crate::{
     error::Result,
@@ -23,10 +23,12 @@ pub struct Recording<'a> {
     most_passes: u32,
     times: PassTimes,
     host: Option<Host<'a>>,
+    ends: bool,
 }
 
 impl<'a> Recording<'a> {
-    /// Starts recording at most `most_passes` passes. Those of a scene that the host traces need `host`.
+    /// Starts recording at most `most_passes` passes. Those of a scene that the host traces need `host`,
+    /// which looks for the end of all paths if the wave `ends` with them.
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if a call fails.
@@ -34,28 +36,35 @@ impl<'a> Recording<'a> {
         device: &'a Arc<Device>,
         most_passes: u32,
         host: Option<Host<'a>>,
+        ends: bool,
     ) -> Result<Self> {
         let commands = Commands::begin_timed(device, most_passes)?;
-        Ok(Self { device, commands, most_passes, times: PassTimes::new(), host })
+        Ok(Self { device, commands, most_passes, times: PassTimes::new(), host, ends })
     }
 
-    /// Adds a pass. If it asks the host, waits for all before and lets the host answer first.
+    /// Adds a pass. If it asks the host, waits for all before and lets the host answer first. Returns false,
+    /// and adds nothing, if the host finds that no path has a ray left.
     ///
     /// # Errors
     /// As [`Commands::submit_and_wait`].
-    pub fn add(&mut self, pass: &Pass, sets: &[&DescriptorSet], wave: &Wave) -> Result<()> {
+    pub fn add(&mut self, pass: &Pass, sets: &[&DescriptorSet], wave: &Wave) -> Result<bool> {
         if let (Some(question), Some((tracer, answers))) = (pass.kernel().question, &self.host) {
             let next = Commands::begin_timed(self.device, self.most_passes)?;
             let mut before = std::mem::replace(&mut self.commands, next);
             before.make_visible_to_host();
             add_times(&mut self.times, before.submit_and_wait()?);
             let start = Instant::now();
+            // Cohorts need the first two vertices of all paths.
+            let may_end = self.ends && question == Question::Closest && wave.vertex > 1;
+            if may_end && !answers.has_rays(wave)? {
+                return Ok(false);
+            }
             tracer.answer(question, wave, answers)?;
             let ms = start.elapsed().as_secs_f64() * 1e3;
             *self.times.entry(pass.kernel().shader.to_owned()).or_default() += ms;
         }
         pass.record(&mut self.commands, sets, wave);
-        Ok(())
+        Ok(true)
     }
 
     /// Commands before the next pass.

@@ -9,7 +9,7 @@ use std::{
 use super::{
     film_buffers::{BLOCK_PIXELS, FilmBuffers, padded_pixels},
     kernel::{Dispatch, Domain, Kernel, Pass},
-    order::{FEATURES, PassSettings, PathLists, wave_order},
+    order::{FEATURES, PassSettings, PathLists, WaveOrder, wave_order},
     recording::Recording,
     scene_buffers::SceneBuffers,
     sharing_buffers::SharingBuffers,
@@ -137,7 +137,8 @@ impl Runner {
         let others = technique.other_steps();
         let all = [technique.steps()].into_iter().chain(others.iter().map(Box::as_ref));
         for steps in all {
-            let mut order = wave_order(&self.settings, steps, Wave::default(), self.settings.depth);
+            let order = wave_order(&self.settings, steps, Wave::default(), self.settings.depth);
+            let mut order = order.all();
             order.push(Dispatch { kernel: self.accumulation(), wave: Wave::default() });
             for Dispatch { kernel, wave } in order {
                 let mut add_ms = |name: &str, start: Instant| {
@@ -255,7 +256,7 @@ impl Runner {
         let film_start = self.film.first_pixel(wave.first_pixel);
         let wave = Wave { film_start, ..wave };
         let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
-        let order = wave_order(&settings, technique.steps(), wave, vertices);
+        let WaveOrder { vertices, end } = wave_order(&settings, technique.steps(), wave, vertices);
         let tracer = self.scene.geometry().host_tracer();
         let answers = || self.waves.answers(self.scene.parameters());
         let host = tracer.map(|tracer| (tracer, answers()));
@@ -264,10 +265,17 @@ impl Runner {
             let pass = Pass::new(&self.device, vacant.key().clone())?;
             vacant.insert(pass);
         }
-        let mut recording = Recording::begin(&self.device, (order.len() + pages) as u32, host)?;
+        let most_passes = (vertices.len() + end.len() + pages) as u32;
+        let ends = self.settings.path_lists != PathLists::Never;
+        let mut recording = Recording::begin(&self.device, most_passes, host, ends)?;
         let film = self.film.set(wave.first_pixel);
         let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
-        for Dispatch { kernel, wave } in order {
+        let mut lives = true;
+        let of_vertices = vertices.len();
+        for (place, Dispatch { kernel, wave }) in vertices.into_iter().chain(end).enumerate() {
+            if !lives && place < of_vertices {
+                continue;
+            }
             let pass = match self.passes.entry(kernel) {
                 Entry::Occupied(occupied) => occupied.into_mut(),
                 Entry::Vacant(vacant) => {
@@ -275,7 +283,8 @@ impl Runner {
                     vacant.insert(pass)
                 }
             };
-            recording.add(pass, &sets, &wave)?;
+            lives &= recording.add(pass, &sets, &wave)?;
+            self.totals.passes += u64::from(lives || place >= of_vertices);
         }
         if accumulates {
             self.record_accumulation(&mut recording, technique, wave)?;

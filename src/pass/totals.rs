@@ -32,6 +32,8 @@ pub struct Totals {
     pub cache_entries: u64,
     /// Times that the weights of a hit's lobes were summed again because its cache had grown.
     pub cdf_rebuilds: u64,
+    /// Passes of waves: fewer where no path reaches the later vertices.
+    pub passes: u64,
     /// Device milliseconds by pass.
     pub gpu_ms: PassTimes,
 }

@@ -228,7 +228,7 @@ impl OnDevice {
         let wave_set = set(&WAVE, own, &self.spare);
         let pass = Pass::new(device, kernel).unwrap();
         let host = self.geometry.host_tracer().map(|tracer| (tracer, answers));
-        let mut recording = Recording::begin(device, 1, host).unwrap();
+        let mut recording = Recording::begin(device, 1, host, false).unwrap();
         recording.add(&pass, &[&self.scene, &wave_set, &self.film], &wave).unwrap();
         recording.finish().unwrap();
         super::assert_silent();
