@@ -119,7 +119,7 @@ fn an_anisotropic_file_is_averaged_with_a_warning() {
     assert!(brdf.warnings()[0].starts_with("anisotropic"), "{:?}", brdf.warnings());
     assert_eq!(brdf.traits, RglTraits { is_anisotropic: true, is_spectral: false });
     assert_is_mean(&brdf);
-    // Of a surface that half a turn changes, whole turns count.
+    // Whole turns count where half a turn changes the surface.
     let azimuths: Vec<f64> = (0..25).map(|index| TAU * f64::from(index) / 24.0 - PI).collect();
     let mut lopsided = measured(ggx, &azimuths, None, |color| color.to_array().to_vec());
     for field in lopsided.iter_mut().filter(|field| field.0 == "rgb") {
