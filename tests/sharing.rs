@@ -283,6 +283,33 @@ fn a_scene_of_twice_the_size_looks_the_same() {
     }
 }
 
+/// Errors of neighbours are their own, unless all pixels of a block are one cohort.
+#[test]
+fn neighbours_are_rarely_in_one_cohort() {
+    let _alone = support::alone();
+    let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.8))]);
+    for (edge, is_alike) in [("2", false), ("4", false), ("8", true)] {
+        let settings = Settings { shadow_rays: 64, ..settings(Sampler::Mis, edge, 2) };
+        let rows = replicates::rows(&scene, &settings, 0..32, 1, 1, |_| {});
+        let means = estimates(&rows);
+        let error = |row: &[f64], pixel: u32| {
+            let green = 3 * pixel as usize + 1;
+            (row[green] - means[green].mean) / means[green].mean.max(1e-3)
+        };
+        let (width, height) = (scene.film.width, scene.film.height);
+        let covariance = |apart: u32| {
+            let pixels = (0..width * height).filter(|pixel| pixel % width + apart < width);
+            let products = rows.iter().flat_map(|row| {
+                pixels.clone().map(|pixel| error(row, pixel) * error(row, pixel + apart))
+            });
+            products.sum::<f64>()
+        };
+        let correlation = covariance(1) / covariance(0);
+        eprintln!("{edge}: {correlation:.3}");
+        assert_eq!(correlation > 0.15, is_alike, "{edge}: {correlation}");
+    }
+}
+
 /// Films that are no multiple of a cohort, or smaller than one, and crop windows.
 #[test]
 fn films_of_odd_sizes_and_crop_windows_have_the_same_mean() {
