@@ -21,14 +21,13 @@ use crate::{
     error::{Error, Result},
     gpu::{Buffer, DescriptorSet, Device},
     pass::{
-        Answers, Domain, Kernel, Pass, Recording, SceneBuffers, Schedule, Steps,
-        wave_buffers::path_list_bytes,
+        Domain, Kernel, Pass, PathDemand, Recording, SceneBuffers, Schedule, Steps, WaveBuffers,
     },
     sampler::{Parameters, basic::Basic},
     shader::{
-        bindings::{FILM, WAVE, film, wave as bindings},
+        bindings::{FILM, film},
         constants::NO_MATERIAL,
-        structs::{Counters, Hit, PathState, Ray, ShadowRay, Wave},
+        structs::{Counters, Hit, Ray, ShadowRay, Wave},
     },
     study::statistics::median,
 };
@@ -43,7 +42,7 @@ pub struct RayPlan {
     pub sampler: Basic,
     /// Shadow rays per hit.
     pub shadow_rays: u32,
-    /// Number of paths in the wave: pixels of the film in film order.
+    /// Most paths in the wave: pixels of the film in film order.
     pub paths: u32,
     /// Number of measurements of each kind of ray.
     pub repetitions: usize,
@@ -153,15 +152,8 @@ impl<'a> Yardstick<'a> {
 struct Bench<'a> {
     device: &'a Arc<Device>,
     scene: &'a SceneBuffers,
-    wave_set: DescriptorSet,
+    waves: WaveBuffers,
     film_set: DescriptorSet,
-    rays: Buffer,
-    hits: Buffer,
-    shadow_rays: Buffer,
-    visibility: Buffer,
-    path_lists: Buffer,
-    paths: Buffer,
-    instances: Buffer,
     /// Bound to the set of the film.
     _counters: Buffer,
     wave: Wave,
@@ -169,72 +161,27 @@ struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     fn new(device: &'a Arc<Device>, scene: &'a SceneBuffers, plan: &RayPlan) -> Result<Self> {
-        let paths = u64::from(plan.paths);
-        let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
-        let rays = make("rays", paths, size_of::<Ray>())?;
-        let hits = make("hits", paths, size_of::<Hit>())?;
-        let shadow_ray_count = paths * u64::from(plan.shadow_rays);
-        let shadow_rays = make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?;
-        let visibility = make("visibility", shadow_ray_count, size_of::<u32>())?;
-        let path_states = make("paths", paths, size_of::<PathState>())?;
-        let instances = make("hit instances", paths, size_of::<u32>())?;
-        let path_lists = Buffer::new(device, "path lists", path_list_bytes(paths))?;
+        let (paths, rays, demand) = (plan.paths, plan.shadow_rays, PathDemand::default());
+        let waves = WaveBuffers::new(device, paths, paths, rays, demand, scene.surfaces())?;
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64)?;
-        let bound = [
-            (bindings::RAYS, &rays),
-            (bindings::RAY_TEXELS, &rays),
-            (bindings::HITS, &hits),
-            (bindings::HIT_TEXELS, &hits),
-            (bindings::SHADOW_RAYS, &shadow_rays),
-            (bindings::SHADOW_RAY_TEXELS, &shadow_rays),
-            (bindings::VISIBILITY, &visibility),
-            (bindings::PATHS, &path_states),
-            (bindings::HIT_INSTANCES, &instances),
-            (bindings::PATH_LISTS, &path_lists),
-            (bindings::PATH_LIST_TEXELS, &path_lists),
-        ];
-        let wave_set = DescriptorSet::new(device, &WAVE, &bound)?;
         let film_set = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &counters)])?;
         let wave = Wave {
-            pixel_count: plan.paths,
+            pixel_count: paths.min(waves.capacity()),
             sample_count: 1,
-            shadow_ray_count: plan.shadow_rays,
-            total_shadow_rays: plan.shadow_rays,
+            shadow_ray_count: rays,
+            total_shadow_rays: rays,
             ..Wave::default()
         };
-        Ok(Self {
-            device,
-            scene,
-            wave_set,
-            film_set,
-            rays,
-            hits,
-            shadow_rays,
-            visibility,
-            path_lists,
-            paths: path_states,
-            instances,
-            _counters: counters,
-            wave,
-        })
+        Ok(Self { device, scene, waves, film_set, _counters: counters, wave })
     }
 
     fn sets(&self) -> [&DescriptorSet; 3] {
-        [self.scene.set(), &self.wave_set, &self.film_set]
+        [self.scene.set(), self.waves.set(), &self.film_set]
     }
 
     /// Runs one pass; seconds of the device, and of the host where it traces.
     fn run(&self, pass: &Pass) -> Result<f64> {
-        let answers = Answers {
-            rays: &self.rays,
-            hits: &self.hits,
-            instances: &self.instances,
-            shadow_rays: &self.shadow_rays,
-            visibility: &self.visibility,
-            paths: &self.paths,
-            path_lists: &self.path_lists,
-            parameters: self.scene.parameters(),
-        };
+        let answers = self.waves.answers(self.scene.parameters());
         let host = self.scene.geometry().host_tracer().map(|tracer| (tracer, answers));
         let mut recording = Recording::begin(self.device, 1, host, false)?;
         recording.add(pass, &self.sets(), &self.wave)?;
@@ -247,7 +194,7 @@ impl<'a> Bench<'a> {
 
     /// Downloads the rays that `trace` would follow.
     fn active_rays(&self) -> Result<Vec<Option<CpuRay>>> {
-        let rays: Vec<Ray> = self.rays.download(self.wave.pixel_count as usize)?;
+        let rays: Vec<Ray> = self.waves.rays().download(self.wave.pixel_count as usize)?;
         let cpu_ray = |ray: &Ray| CpuRay::new_inf(ray.origin.into(), ray.direction.into());
         Ok(rays.iter().map(|ray| (ray.is_active != 0).then(|| cpu_ray(ray))).collect())
     }
@@ -255,9 +202,9 @@ impl<'a> Bench<'a> {
     /// Downloads the rays that `shadow` would follow.
     fn active_shadow_rays(&self, accel: &Accel) -> Result<Vec<Option<CpuRay>>> {
         let paths = self.wave.pixel_count as usize;
-        let hits: Vec<Hit> = self.hits.download(paths)?;
+        let hits: Vec<Hit> = self.waves.hits().download(paths)?;
         let count = paths * self.wave.shadow_ray_count as usize;
-        let shadow_rays: Vec<ShadowRay> = self.shadow_rays.download(count)?;
+        let shadow_rays: Vec<ShadowRay> = self.waves.shadow_rays().download(count)?;
         Ok(shadow_rays
             .iter()
             .zip(hits.iter().cycle())
@@ -277,10 +224,10 @@ impl<'a> Bench<'a> {
     /// Tests for each of `count` rays whether it met a surface, after `trace` or, for any hit, `shadow`.
     fn met(&self, any_hit: bool, count: usize) -> Result<Vec<bool>> {
         if any_hit {
-            let visibility: Vec<u32> = self.visibility.download(count)?;
+            let visibility: Vec<u32> = self.waves.visibility().download(count)?;
             return Ok(visibility.iter().map(|visible| *visible == 0).collect());
         }
-        let hits: Vec<Hit> = self.hits.download(count)?;
+        let hits: Vec<Hit> = self.waves.hits().download(count)?;
         Ok(hits.iter().map(|hit| hit.material != NO_MATERIAL).collect())
     }
 }
