@@ -9,7 +9,7 @@ use fenestra::{
     sampler::Sampler,
     scene::{
         Geometry, Lamp, Scene,
-        lamp::{LampKind, SpotFalloff},
+        lamp::{LampKind, Spot, SpotFalloff},
         material::{Emission, Material, MaterialKind},
         texture::{Interpolation, Texels, Texture, TextureUse},
     },
@@ -203,14 +203,14 @@ fn lamps_without_a_surface_light_a_plane() {
     for falloff in [SpotFalloff::SquaredCosine, SpotFalloff::SmoothCosine, SpotFalloff::LinearAngle]
     {
         let (inner, outer) = (0.1_f32, 0.4_f32);
-        let spot = lit_by(LampKind::Spot {
+        let spot = lit_by(LampKind::Spot(Spot {
             position,
             direction: down,
             intensity,
             inner_angle_rad: inner,
             outer_angle_rad: outer,
             falloff,
-        });
+        }));
         let expected = mean_over_plane(&spot, |place| {
             let to_lamp = position - place;
             let cosine = to_lamp.normalize().y;

@@ -117,9 +117,8 @@ impl LampTables {
         let radius = radius(scene.geometry.extent());
         for (index, lamp) in (0_u32..).zip(&scene.lamps) {
             let centre = match lamp.kind {
-                LampKind::Point { position, .. } | LampKind::Spot { position, .. } => {
-                    Some(position)
-                }
+                LampKind::Point { position, .. } => Some(position),
+                LampKind::Spot(spot) => Some(spot.position),
                 LampKind::Directional { .. } => None,
             };
             let power = power(&lamp.kind, radius);
@@ -284,9 +283,9 @@ pub(super) fn radius(positions: impl Iterator<Item = Vec3>) -> f32 {
 fn power(kind: &LampKind, radius: f32) -> f64 {
     let power = match *kind {
         LampKind::Point { intensity, .. } => 4.0 * PI * luminance(intensity),
-        LampKind::Spot { intensity, inner_angle_rad, outer_angle_rad, .. } => {
-            let mean = 0.5 * (inner_angle_rad.cos() + outer_angle_rad.cos());
-            2.0 * PI * (1.0 - mean) * luminance(intensity)
+        LampKind::Spot(spot) => {
+            let mean = 0.5 * (spot.inner_angle_rad.cos() + spot.outer_angle_rad.cos());
+            2.0 * PI * (1.0 - mean) * luminance(spot.intensity)
         }
         LampKind::Directional { irradiance, .. } => PI * radius * radius * luminance(irradiance),
     };
@@ -303,30 +302,18 @@ fn convert(lamp: &Lamp, groups: &LightGroups) -> structs::Lamp {
             light_group,
             ..structs::Lamp::default()
         },
-        LampKind::Spot {
-            position,
-            direction,
-            intensity,
-            inner_angle_rad,
-            outer_angle_rad,
-            falloff,
-        } => {
-            let (kind, inner, outer) = match falloff {
-                SpotFalloff::SquaredCosine => {
-                    (LAMP_SPOT_SQUARED_COSINE, inner_angle_rad.cos(), outer_angle_rad.cos())
-                }
-                SpotFalloff::SmoothCosine => {
-                    (LAMP_SPOT_SMOOTH_COSINE, inner_angle_rad.cos(), outer_angle_rad.cos())
-                }
-                SpotFalloff::LinearAngle => {
-                    (LAMP_SPOT_LINEAR_ANGLE, inner_angle_rad, outer_angle_rad)
-                }
+        LampKind::Spot(spot) => {
+            let (inner, outer) = (spot.inner_angle_rad, spot.outer_angle_rad);
+            let (kind, inner, outer) = match spot.falloff {
+                SpotFalloff::SquaredCosine => (LAMP_SPOT_SQUARED_COSINE, inner.cos(), outer.cos()),
+                SpotFalloff::SmoothCosine => (LAMP_SPOT_SMOOTH_COSINE, inner.cos(), outer.cos()),
+                SpotFalloff::LinearAngle => (LAMP_SPOT_LINEAR_ANGLE, inner, outer),
             };
             structs::Lamp {
                 kind,
-                position: position.into(),
-                direction: direction.into(),
-                intensity: intensity.into(),
+                position: spot.position.into(),
+                direction: spot.direction.into(),
+                intensity: spot.intensity.into(),
                 inner,
                 outer,
                 light_group,

@@ -228,17 +228,10 @@ impl Hasher {
                 self.integers(&[0]);
                 self.vectors(&[position, intensity]);
             }
-            LampKind::Spot {
-                position,
-                direction,
-                intensity,
-                inner_angle_rad,
-                outer_angle_rad,
-                falloff,
-            } => {
-                self.integers(&[1, falloff as u32]);
-                self.vectors(&[position, direction, intensity]);
-                self.floats(&[inner_angle_rad, outer_angle_rad]);
+            LampKind::Spot(spot) => {
+                self.integers(&[1, spot.falloff as u32]);
+                self.vectors(&[spot.position, spot.direction, spot.intensity]);
+                self.floats(&[spot.inner_angle_rad, spot.outer_angle_rad]);
             }
             LampKind::Directional { direction, irradiance } => {
                 self.integers(&[2]);

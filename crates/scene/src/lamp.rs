@@ -26,20 +26,7 @@ pub enum LampKind {
         intensity: Vec3,
     },
     /// Shines from a point into a cone.
-    Spot {
-        /// Place, metres.
-        position: Vec3,
-        /// Unit axis of the cone, away from the lamp.
-        direction: Vec3,
-        /// Radiant intensity along the axis, per steradian, linear Rec.709.
-        intensity: Vec3,
-        /// Angle to the axis where the light begins to fall off, radians.
-        inner_angle_rad: f32,
-        /// Angle to the axis from which there is no light, radians, above the inner one.
-        outer_angle_rad: f32,
-        /// Course of the light between these angles.
-        falloff: SpotFalloff,
-    },
+    Spot(Spot),
     /// Shines from infinitely far away along one direction.
     Directional {
         /// Unit direction in which the light travels.
@@ -47,6 +34,23 @@ pub enum LampKind {
         /// Irradiance on a surface that faces the light, linear Rec.709.
         irradiance: Vec3,
     },
+}
+
+/// Light from a point into a cone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// Place, metres.
+    pub position: Vec3,
+    /// Unit axis of the cone, away from the lamp.
+    pub direction: Vec3,
+    /// Radiant intensity along the axis, per steradian, linear Rec.709.
+    pub intensity: Vec3,
+    /// Angle to the axis where the light begins to fall off, radians.
+    pub inner_angle_rad: f32,
+    /// Angle to the axis from which there is no light, radians, above the inner one.
+    pub outer_angle_rad: f32,
+    /// Course of the light between these angles.
+    pub falloff: SpotFalloff,
 }
 
 /// Course of a spot's light between its two angles.

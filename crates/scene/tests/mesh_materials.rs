@@ -472,20 +472,16 @@ fn lights_of_nodes_become_lamps() {
     assert_eq!(bulb.kind, LampKind::Point { position: above, intensity });
     let direction = Vec3::NEG_Z;
     assert_eq!(sun.kind, LampKind::Directional { direction, irradiance: Vec3::splat(3.0) });
-    let LampKind::Spot {
-        position,
-        direction,
-        intensity,
-        inner_angle_rad,
-        outer_angle_rad,
-        falloff,
-    } = beam.kind
-    else {
-        panic!("{beam:?}")
-    };
-    assert!(close(direction, [0.0, -1.0, 0.0]), "{direction}");
-    assert_eq!((position, intensity, inner_angle_rad), (above, Vec3::splat(2.0), 0.1));
-    assert_eq!((outer_angle_rad.to_degrees(), falloff), (45.0, SpotFalloff::SquaredCosine));
+    let LampKind::Spot(spot) = beam.kind else { panic!("{beam:?}") };
+    assert!(close(spot.direction, [0.0, -1.0, 0.0]), "{}", spot.direction);
+    assert_eq!(
+        (spot.position, spot.intensity, spot.inner_angle_rad),
+        (above, Vec3::splat(2.0), 0.1)
+    );
+    assert_eq!(
+        (spot.outer_angle_rad.to_degrees(), spot.falloff),
+        (45.0, SpotFalloff::SquaredCosine)
+    );
     // The lamps are a part of the picture.
     let other = text.replace("\"intensity\": 3", "\"intensity\": 4");
     assert_ne!(Scene::load(&folder.write("b.gltf", other)).unwrap().hash, scene.hash);

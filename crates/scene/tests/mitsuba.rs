@@ -483,16 +483,12 @@ fn lamps_shine_where_they_look() {
         <emitter type="point"><point name="position" x="1" z="2"/></emitter>"#,
     );
     assert_eq!(scene.warnings, [""; 0]);
-    let LampKind::Spot { position, direction, inner_angle_rad, outer_angle_rad, falloff, .. } =
-        scene.lamps[0].kind
-    else {
-        panic!()
-    };
-    assert_close(position, Vec3::new(1.0, 2.0, 3.0));
-    assert_close(direction, Vec3::NEG_Y);
-    assert!((inner_angle_rad - PI / 6.0).abs() < 1e-6);
-    assert!((outer_angle_rad - PI / 4.5).abs() < 1e-6);
-    assert_eq!((falloff, scene.lamps[0].name.as_str()), (SpotFalloff::LinearAngle, "desk"));
+    let LampKind::Spot(spot) = scene.lamps[0].kind else { panic!() };
+    assert_close(spot.position, Vec3::new(1.0, 2.0, 3.0));
+    assert_close(spot.direction, Vec3::NEG_Y);
+    assert!((spot.inner_angle_rad - PI / 6.0).abs() < 1e-6);
+    assert!((spot.outer_angle_rad - PI / 4.5).abs() < 1e-6);
+    assert_eq!((spot.falloff, scene.lamps[0].name.as_str()), (SpotFalloff::LinearAngle, "desk"));
     let irradiance = Vec3::new(1.0, 2.0, 3.0);
     assert_eq!(scene.lamps[1].kind, LampKind::Directional { direction: Vec3::NEG_Y, irradiance });
     let position = Vec3::new(1.0, 0.0, 2.0);
@@ -504,8 +500,8 @@ fn lamps_shine_where_they_look() {
         <texture type="bitmap" name="texture"><string name="filename" value="a.png"/></texture>
         </emitter>"#;
     let scene = loaded(&folder.write("a.xml", document(&format!("{SENSOR}{text}"))));
-    let LampKind::Spot { intensity, .. } = scene.lamps[0].kind else { panic!() };
-    assert_close(intensity, Vec3::new(1.0, 2.0, 3.0));
+    let LampKind::Spot(spot) = scene.lamps[0].kind else { panic!() };
+    assert_close(spot.intensity, Vec3::new(1.0, 2.0, 3.0));
     assert!(scene.warnings[0].ends_with("its mean over the whole cone"), "{:?}", scene.warnings);
 }
 

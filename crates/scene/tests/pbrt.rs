@@ -471,13 +471,10 @@ fn lamps_have_their_places_and_powers() {
     );
     let down = Vec3::NEG_Y;
     assert_eq!(kinds[2], LampKind::Directional { direction: down, irradiance: Vec3::splat(3.0) });
-    let LampKind::Spot { direction, inner_angle_rad, outer_angle_rad, falloff, .. } = kinds[3]
-    else {
-        panic!()
-    };
-    assert_eq!((direction, falloff), (Vec3::X, SpotFalloff::SmoothCosine));
-    assert!((inner_angle_rad - 30_f32.to_radians()).abs() < 1e-6);
-    assert!((outer_angle_rad - 40_f32.to_radians()).abs() < 1e-6);
+    let LampKind::Spot(spot) = kinds[3] else { panic!() };
+    assert_eq!((spot.direction, spot.falloff), (Vec3::X, SpotFalloff::SmoothCosine));
+    assert!((spot.inner_angle_rad - 30_f32.to_radians()).abs() < 1e-6);
+    assert!((spot.outer_angle_rad - 40_f32.to_radians()).abs() < 1e-6);
     assert_eq!(warnings(&scene), [""; 0]);
     // A plain camera mirrors the world in z.
     let far = load(VIEW, r#"LightSource "point" "point3 from" [0 0 4]"#);
@@ -505,13 +502,14 @@ fn lamps_with_images_have_their_means() {
     );
     let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
     let intensity = |lamp: usize| match scene.lamps[lamp].kind {
-        LampKind::Point { intensity, .. } | LampKind::Spot { intensity, .. } => intensity,
+        LampKind::Point { intensity, .. } => intensity,
+        LampKind::Spot(spot) => spot.intensity,
         LampKind::Directional { .. } => panic!(),
     };
     assert!(intensity(0).abs_diff_eq(Vec3::new(1.0, 2.0, 3.0), 1e-5), "{}", intensity(0));
     assert!(intensity(1).abs_diff_eq(Vec3::ONE, 1e-5), "{}", intensity(1));
-    let LampKind::Spot { direction, outer_angle_rad, .. } = scene.lamps[2].kind else { panic!() };
-    assert!(direction.abs_diff_eq(Vec3::X, 1e-6), "{direction}");
+    let LampKind::Spot(spot) = scene.lamps[2].kind else { panic!() };
+    assert!(spot.direction.abs_diff_eq(Vec3::X, 1e-6), "{}", spot.direction);
     assert!(intensity(2).abs_diff_eq(Vec3::new(0.5, 0.0, 0.5), 1e-5), "{}", intensity(2));
     // The frame, 4 wide and 2 high at the distance 1, integrated by its middle points.
     let middle = |index: usize| (index as f32 + 0.5) / 50.0;
@@ -519,7 +517,7 @@ fn lamps_with_images_have_their_means() {
     let solid_angle: f32 = places
         .map(|(x, y)| 0.04 * 0.04 / (1.0 + (x - 2.0).powi(2) + (y - 1.0).powi(2)).powf(1.5))
         .sum();
-    let cone = 2.0 * std::f32::consts::PI * (1.0 - outer_angle_rad.cos());
+    let cone = 2.0 * std::f32::consts::PI * (1.0 - spot.outer_angle_rad.cos());
     assert!((cone / solid_angle - 1.0).abs() < 2e-3, "{cone} {solid_angle}");
     let power = solid_angle * (0.2126 * intensity(3).x + 0.0722 * intensity(3).z);
     assert!((power - 1.0).abs() < 2e-3, "{power}");

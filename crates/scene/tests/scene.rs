@@ -677,14 +677,10 @@ fn lamps_take_every_form_and_a_scene_needs_no_environment() {
     let position = Vec3::new(1.0, 2.0, 3.0);
     let intensity = Vec3::new(4.0, 5.0, 6.0);
     assert_eq!(scene.lamps[0].kind, LampKind::Point { position, intensity });
-    let LampKind::Spot { direction, inner_angle_rad, outer_angle_rad, falloff, .. } =
-        scene.lamps[1].kind
-    else {
-        unreachable!()
-    };
-    assert_eq!((direction, falloff), (Vec3::NEG_Y, SpotFalloff::SmoothCosine));
+    let LampKind::Spot(spot) = scene.lamps[1].kind else { unreachable!() };
+    assert_eq!((spot.direction, spot.falloff), (Vec3::NEG_Y, SpotFalloff::SmoothCosine));
     let angles = [10.0_f32, 45.0].map(f32::to_radians);
-    assert_eq!([inner_angle_rad, outer_angle_rad], angles);
+    assert_eq!([spot.inner_angle_rad, spot.outer_angle_rad], angles);
     assert!(matches!(scene.lamps[2].kind, LampKind::Directional { direction, .. }
         if direction.is_normalized()));
     let case = |from: &str, to: &str, expected: &str| {

@@ -12,7 +12,7 @@ use crate::{
     file::{Entry, IncludeKeys},
     import::Imported,
     instance::{Budget, Instance},
-    lamp::LampKind,
+    lamp::{LampKind, Spot},
     material::{Material, MaterialKind},
     mesh::Mesh,
     transform::Transform,
@@ -225,7 +225,7 @@ fn place_lamp(mut lamp: Lamp, transform: &Transform) -> Lamp {
             *position = transform.position(position.to_array()).into();
             *intensity *= area;
         }
-        LampKind::Spot { position, direction, intensity, .. } => {
+        LampKind::Spot(Spot { position, direction, intensity, .. }) => {
             *position = transform.position(position.to_array()).into();
             *intensity *= area;
             turn(direction);

@@ -9,7 +9,7 @@ use crate::{
     EnvironmentMap, Lamp, Portal,
     error::Result,
     file::{EnvironmentEntry, LampEntry, LampKindEntry, SceneFile},
-    lamp::LampKind,
+    lamp::{LampKind, Spot},
 };
 
 /// Light of a scene apart from emitting surfaces.
@@ -137,14 +137,14 @@ impl Loader<'_> {
                          {outer}"
                     )
                 })?;
-                LampKind::Spot {
+                LampKind::Spot(Spot {
                     position: place(entry.position)?,
                     direction: direction(entry.direction)?,
                     intensity: power("intensity", entry.intensity)?,
                     inner_angle_rad: inner.to_radians(),
                     outer_angle_rad: outer.to_radians(),
                     falloff: entry.falloff,
-                }
+                })
             }
             LampKindEntry::Directional(entry) => LampKind::Directional {
                 direction: direction(entry.direction)?,

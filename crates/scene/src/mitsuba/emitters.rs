@@ -14,7 +14,7 @@ use crate::{
     EnvironmentMap, Lamp,
     error::Result,
     features,
-    lamp::{LampKind, SpotFalloff},
+    lamp::{LampKind, Spot, SpotFalloff},
     material::Emission,
 };
 
@@ -95,7 +95,7 @@ impl Reader {
             self.ignored.add(features::MI_SPOT_TEXTURE, || node.place());
         }
         let factor = texture.map_or(Vec3::ONE, |texture| texture.mean());
-        Ok(LampKind::Spot {
+        Ok(LampKind::Spot(Spot {
             position: matrix.w_axis.truncate().as_vec3(),
             direction: along_z(node, matrix)?,
             intensity: light(parameters, "intensity")? * factor,
@@ -103,7 +103,7 @@ impl Reader {
             inner_angle_rad: inner.min(0.999 * outer).to_radians(),
             outer_angle_rad: outer.to_radians(),
             falloff: SpotFalloff::LinearAngle,
-        })
+        }))
     }
 
     /// Reads the light of a shape; none if it has none.

@@ -14,7 +14,7 @@ use crate::{
     error::Result,
     features,
     import::equal_area::resample,
-    lamp::{LampKind, SpotFalloff},
+    lamp::{LampKind, Spot, SpotFalloff},
     math::colour::luminance,
     texture::{Encoding, Texture, TextureUse},
 };
@@ -136,7 +136,7 @@ impl Lights {
                 let [inner, outer] = [inner.clamp(0.0, outer), outer].map(f64::to_radians);
                 let cone = 2.0 * PI * (1.0 - 0.5 * (inner.cos() + outer.cos()));
                 let factor = scale * power.map_or(1.0, |power| power / cone);
-                LampKind::Spot {
+                LampKind::Spot(Spot {
                     position: place(from),
                     direction: direction(to - from)?,
                     intensity: color(entity, "I", textures)? * factor as f32 * exposure,
@@ -144,7 +144,7 @@ impl Lights {
                     inner_angle_rad: inner.min(outer * (1.0 - 1e-4)) as f32,
                     outer_angle_rad: outer as f32,
                     falloff: SpotFalloff::SmoothCosine,
-                }
+                })
             }
             "goniometric" => {
                 let (mean, _) = mean_of_image(entity, textures)?;
@@ -167,20 +167,20 @@ impl Lights {
                 let of_power =
                     |power: f64| power / (solid_angle * f64::from(luminance(mean)).max(1e-30));
                 let factor = scale * power.map_or(1.0, of_power);
-                LampKind::Spot {
+                LampKind::Spot(Spot {
                     position: place(from),
                     direction: direction(DVec3::Z)?,
                     intensity: mean * factor as f32 * exposure,
                     inner_angle_rad: (outer * (1.0 - 1e-4)) as f32,
                     outer_angle_rad: outer as f32,
                     falloff: SpotFalloff::SmoothCosine,
-                }
+                })
             }
             other => return Err(entity.error(format!("unknown light `{other}`"))),
         };
         textures.log.unused(entity);
         let (LampKind::Point { intensity: color, .. }
-        | LampKind::Spot { intensity: color, .. }
+        | LampKind::Spot(Spot { intensity: color, .. })
         | LampKind::Directional { irradiance: color, .. }) = kind;
         if !color.is_finite() || color.min_element() < 0.0 {
             return Err(entity.error(format!("expected finite light of at least 0, found {color}")));

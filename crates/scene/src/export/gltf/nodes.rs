@@ -42,9 +42,7 @@ pub(super) fn lamp(lamp: &Lamp, index: usize, warnings: &mut Vec<String>) -> [Va
         LampKind::Directional { direction, irradiance } => {
             ("directional", Vec3::ZERO, direction, irradiance)
         }
-        LampKind::Spot { position, direction, intensity, .. } => {
-            ("spot", position, direction, intensity)
-        }
+        LampKind::Spot(spot) => ("spot", spot.position, spot.direction, spot.intensity),
     };
     let intensity = color.max_element();
     let color = if intensity > 0.0 { color / intensity } else { Vec3::ONE };
@@ -52,23 +50,23 @@ pub(super) fn lamp(lamp: &Lamp, index: usize, warnings: &mut Vec<String>) -> [Va
     if !lamp.name.is_empty() {
         light["name"] = lamp.name.clone().into();
     }
-    if let LampKind::Spot { inner_angle_rad, outer_angle_rad, falloff, .. } = lamp.kind {
-        if falloff != SpotFalloff::SquaredCosine {
+    if let LampKind::Spot(spot) = lamp.kind {
+        if spot.falloff != SpotFalloff::SquaredCosine {
             warnings.push(format!(
                 "lamp `{}`: between its two angles glTF's spot falls off by t², with t linear in the \
                  cosine, Fenestra's by another curve",
                 lamp.name
             ));
         }
-        if outer_angle_rad > FRAC_PI_2 {
+        if spot.outer_angle_rad > FRAC_PI_2 {
             warnings.push(format!(
                 "lamp `{}`: glTF's spots reach to 90°, this one to {:.1}°",
                 lamp.name,
-                outer_angle_rad.to_degrees()
+                spot.outer_angle_rad.to_degrees()
             ));
         }
-        let outer = outer_angle_rad.min(FRAC_PI_2);
-        let inner = inner_angle_rad.min(0.999 * outer);
+        let outer = spot.outer_angle_rad.min(FRAC_PI_2);
+        let inner = spot.inner_angle_rad.min(0.999 * outer);
         light["spot"] = json!({"innerConeAngle": inner, "outerConeAngle": outer});
     }
     let turn = Quat::from_rotation_arc(Vec3::NEG_Z, direction.normalize_or(Vec3::NEG_Z));

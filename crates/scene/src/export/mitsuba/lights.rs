@@ -26,35 +26,28 @@ pub(super) fn lamp(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
             let along = point("vector name=\"direction\"", direction);
             ("directional", format!("        {along}\n{}", colour("irradiance", irradiance)))
         }
-        LampKind::Spot {
-            position,
-            direction,
-            intensity,
-            inner_angle_rad,
-            outer_angle_rad,
-            falloff,
-        } => {
-            if falloff != SpotFalloff::LinearAngle {
+        LampKind::Spot(spot) => {
+            if spot.falloff != SpotFalloff::LinearAngle {
                 warnings.push(format!(
                     "lamp `{}`: between its two angles Mitsuba's spot falls off in proportion to \
                      the angle, Fenestra's by a smooth curve",
                     lamp.name
                 ));
             }
-            let target = position.as_dvec3() + direction.as_dvec3();
+            let target = spot.position.as_dvec3() + spot.direction.as_dvec3();
             let content = format!(
                 "        <transform name=\"to_world\">\n            <lookat origin=\"{}\" \
                  target=\"{}, {}, {}\" up=\"{}\"/>\n        </transform>\n{}        \
                  <float name=\"cutoff_angle\" value=\"{}\"/>\n        \
                  <float name=\"beam_width\" value=\"{}\"/>\n",
-                triple(position),
+                triple(spot.position),
                 target.x,
                 target.y,
                 target.z,
-                triple(direction.any_orthonormal_vector()),
-                colour("intensity", intensity),
-                outer_angle_rad.to_degrees(),
-                inner_angle_rad.to_degrees()
+                triple(spot.direction.any_orthonormal_vector()),
+                colour("intensity", spot.intensity),
+                spot.outer_angle_rad.to_degrees(),
+                spot.inner_angle_rad.to_degrees()
             );
             ("spot", content)
         }

@@ -30,29 +30,22 @@ pub(super) fn lamp(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
             triple(irradiance),
             triple(direction)
         ),
-        LampKind::Spot {
-            position,
-            direction,
-            intensity,
-            inner_angle_rad,
-            outer_angle_rad,
-            falloff,
-        } => {
-            if falloff != SpotFalloff::SmoothCosine {
+        LampKind::Spot(spot) => {
+            if spot.falloff != SpotFalloff::SmoothCosine {
                 warnings.push(format!(
                     "lamp `{}`: between its two angles pbrt's spot falls off by 3t² − 2t³, with t \
                      linear in the cosine, Fenestra's by another curve",
                     lamp.name
                 ));
             }
-            let target = position.as_dvec3() + direction.as_dvec3();
-            let [inner, outer] =
-                [inner_angle_rad, outer_angle_rad].map(|angle| f64::from(angle).to_degrees());
+            let target = spot.position.as_dvec3() + spot.direction.as_dvec3();
+            let [inner, outer] = [spot.inner_angle_rad, spot.outer_angle_rad]
+                .map(|angle| f64::from(angle).to_degrees());
             format!(
                 "LightSource \"spot\" \"rgb I\" [{}] \"point3 from\" [{}]\n    \
                  \"point3 to\" [{} {} {}] \"float coneangle\" {outer} \"float conedeltaangle\" {}\n",
-                triple(intensity),
-                triple(position),
+                triple(spot.intensity),
+                triple(spot.position),
                 target.x,
                 target.y,
                 target.z,

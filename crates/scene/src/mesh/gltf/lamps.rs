@@ -15,7 +15,7 @@ use super::{
 use crate::{
     error::Result,
     features,
-    lamp::{Lamp, LampKind, SpotFalloff},
+    lamp::{Lamp, LampKind, Spot, SpotFalloff},
 };
 
 impl GltfReader<'_> {
@@ -56,14 +56,14 @@ impl GltfReader<'_> {
                         place()
                     )));
                 }
-                LampKind::Spot {
+                LampKind::Spot(Spot {
                     position,
                     direction,
                     intensity,
                     inner_angle_rad,
                     outer_angle_rad,
                     falloff: SpotFalloff::SquaredCosine,
-                }
+                })
             }
             Some("directional") => LampKind::Directional { direction, irradiance: intensity },
             _ => {
