@@ -60,11 +60,10 @@ type QueryOfThree = unsafe extern "C" fn(*const Lanes<c_int>, Handle, *mut Conte
 /// Those of version 4 take arguments after them.
 type QueryOfFour = unsafe extern "C" fn(*const Lanes<c_int>, Handle, *mut Packet, *mut Arguments);
 
-/// Functions that follow the rays of a packet.
-#[derive(Clone, Copy)]
+/// Functions that follow the rays of a packet: to their closest hits, and to any.
 pub(super) enum Queries {
-    Three { closest: QueryOfThree, any: QueryOfThree },
-    Four { closest: QueryOfFour, any: QueryOfFour },
+    Three([QueryOfThree; 2]),
+    Four([QueryOfFour; 2]),
 }
 
 /// The library and a device of it.
@@ -127,14 +126,8 @@ impl Embree {
         let number = unsafe { property(device, PROPERTY_VERSION) };
         let version = format!("{}.{}.{}", number / 10_000, number / 100 % 100, number % 100);
         let queries = match number / 10_000 {
-            3 => Queries::Three {
-                closest: function(&library, "rtcIntersect8")?,
-                any: function(&library, "rtcOccluded8")?,
-            },
-            4 => Queries::Four {
-                closest: function(&library, "rtcIntersect8")?,
-                any: function(&library, "rtcOccluded8")?,
-            },
+            3 => Queries::Three(queries(&library)?),
+            4 => Queries::Four(queries(&library)?),
             _ => return Err(format!("found version {version}")),
         };
         // SAFETY: the device is alive; the monitor is a function that touches no state of its own.
@@ -196,6 +189,10 @@ fn missing(what: String) -> Error {
 
 fn function<T: Copy>(library: &Library, name: &str) -> Result<T, String> {
     library::function(library, &[name]).ok_or_else(|| format!("it lacks {name}"))
+}
+
+fn queries<T: Copy>(library: &Library) -> Result<[T; 2], String> {
+    Ok([function(library, "rtcIntersect8")?, function(library, "rtcOccluded8")?])
 }
 
 /// Says before the library allocates memory whether it may.

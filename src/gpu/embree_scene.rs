@@ -32,9 +32,11 @@ const ROBUST: c_int = 1 << 2;
 const VERTEX_BYTES: usize = 16;
 
 /// Positions of triangles, three for each.
-enum Vertices {
+#[derive(Clone)]
+pub(crate) enum Vertices {
     /// In a buffer whose memory the host shares.
     Shared(Arc<Buffer>),
+    /// In the world, and one vertex more, since the library reads beyond the last.
     Own(Arc<Vec<[f32; 3]>>),
 }
 
@@ -50,39 +52,23 @@ pub(crate) struct Part {
 }
 
 impl Part {
-    /// Takes `triangles` of the scene, which lie in a buffer whose memory the host shares; `first` is the
-    /// first of the buffer.
-    pub(crate) fn shared(
-        vertices: &Arc<Buffer>,
+    /// Takes `triangles` of the scene, whose positions are `vertices` from those of `first` on.
+    pub(crate) fn new(
+        vertices: Vertices,
         first: u32,
         instance: u32,
         is_passing: bool,
         triangles: impl Iterator<Item = u32>,
     ) -> Self {
-        let vertices = Vertices::Shared(Arc::clone(vertices));
-        Self { vertices, first, corners: corners(first, triangles), instance, is_passing }
-    }
-
-    /// Takes `triangles` of an instance, whose positions in the world are `vertices`, from those of `first`
-    /// on; one more than there are, since the library reads beyond the last.
-    pub(crate) fn own(
-        vertices: &Arc<Vec<[f32; 3]>>,
-        first: u32,
-        instance: u32,
-        is_passing: bool,
-        triangles: impl Iterator<Item = u32>,
-    ) -> Self {
-        let vertices = Vertices::Own(Arc::clone(vertices));
-        Self { vertices, first, corners: corners(first, triangles), instance, is_passing }
+        let corners = triangles
+            .map(|triangle| [0, 1, 2].map(|corner| 3 * (triangle - first) + corner))
+            .collect();
+        Self { vertices, first, corners, instance, is_passing }
     }
 
     fn triangle(&self, primitive: u32) -> u32 {
         self.first + self.corners[primitive as usize][0] / 3
     }
-}
-
-fn corners(first: u32, triangles: impl Iterator<Item = u32>) -> Vec<[u32; 3]> {
-    triangles.map(|triangle| [0, 1, 2].map(|corner| 3 * (triangle - first) + corner)).collect()
 }
 
 /// A surface of a passing [`Part`] that a ray meets, not always the closest.
@@ -102,6 +88,13 @@ pub(crate) struct Found {
     pub triangle: u32,
     pub instance: u32,
     pub distance: f32,
+}
+
+/// Hits that rays are followed to; the place of a function in [`Queries`].
+#[derive(Clone, Copy)]
+pub(crate) enum Search {
+    Closest,
+    Any,
 }
 
 /// Decides whether a ray stops at a surface.
@@ -135,8 +128,8 @@ impl EmbreeScene {
         let raw = unsafe { (embree.new_scene)(embree.device) };
         let scene = Self { raw, parts, embree: Arc::clone(embree) };
         let filter: Filter = match embree.queries {
-            Queries::Three { .. } => heed::<true>,
-            Queries::Four { .. } => heed::<false>,
+            Queries::Three(_) => heed::<true>,
+            Queries::Four(_) => heed::<false>,
         };
         for (number, part) in (0..).zip(&scene.parts) {
             let (vertices, stride, vertex_count) = match &part.vertices {
@@ -189,28 +182,14 @@ impl EmbreeScene {
         embree.check("the host's tree").map(|()| scene)
     }
 
-    /// Finds the closest hits of the rays of a packet, for [`EmbreeScene::hit`]. `is_coherent` says that they
-    /// go the same way.
-    pub(crate) fn find_closest(
+    /// Follows the rays of a packet: to their closest hits, for [`EmbreeScene::hit`], or to any, for
+    /// [`Packet::is_blocked`]. `is_coherent` says that they go the same way.
+    pub(crate) fn find(
         &self,
-        packet: &mut Packet,
-        is_coherent: bool,
-        stops: &mut Stops<'_>,
-    ) {
-        self.find(packet, is_coherent, stops, true);
-    }
-
-    /// Finds any hit of the rays of a packet, for [`Packet::is_blocked`].
-    pub(crate) fn find_any(&self, packet: &mut Packet, stops: &mut Stops<'_>) {
-        self.find(packet, false, stops, false);
-    }
-
-    fn find(
-        &self,
+        search: Search,
         packet: &mut Packet,
         is_coherent: bool,
         mut stops: &mut Stops<'_>,
-        finds_closest: bool,
     ) {
         let heed = (&raw mut stops).cast::<c_void>();
         let packet = ptr::from_mut(packet);
@@ -219,17 +198,14 @@ impl EmbreeScene {
         // returns, and find `stops` by `heed`.
         unsafe {
             let followed = &raw const (*packet).followed;
-            match self.embree.queries {
-                Queries::Three { closest, any } => {
-                    let find = if finds_closest { closest } else { any };
-                    find(followed, self.raw, &mut Context::new(heed, is_coherent), packet);
+            match &self.embree.queries {
+                Queries::Three(queries) => {
+                    let context = &mut Context::new(heed, is_coherent);
+                    queries[search as usize](followed, self.raw, context, packet);
                 }
-                Queries::Four { closest, any } => {
-                    let find = if finds_closest { closest } else { any };
-                    Arguments::with(heed, is_coherent, |arguments| {
-                        find(followed, self.raw, packet, arguments);
-                    });
-                }
+                Queries::Four(queries) => Arguments::with(heed, is_coherent, |arguments| {
+                    queries[search as usize](followed, self.raw, packet, arguments);
+                }),
             }
         }
     }

@@ -6,7 +6,10 @@ use std::{ops::Range, sync::Arc};
 use crate::{
     accel::{Accel, instances::Record},
     error::{Error, Result},
-    gpu::{Buffer, embree_scene::Part},
+    gpu::{
+        Buffer,
+        embree_scene::{Part, Vertices},
+    },
     memory,
     shader::constants::NO_INSTANCE,
 };
@@ -93,7 +96,8 @@ fn shared_parts(
             let triangles = (first.max(triangles.start)..end).filter(|&triangle| {
                 may_pass(accel.triangle_materials[triangle as usize]) == is_passing
             });
-            parts.push(Part::shared(page, first, instance, is_passing, triangles));
+            let vertices = Vertices::Shared(Arc::clone(page));
+            parts.push(Part::new(vertices, first, instance, is_passing, triangles));
         }
     }
     parts
@@ -113,11 +117,11 @@ fn own_parts(
         corners.map(|vertex| record.point_to_world(vertex.position.into()).to_array())
     }));
     vertices.push([0.0; 3]);
-    let vertices = Arc::new(vertices);
+    let vertices = Vertices::Own(Arc::new(vertices));
     [false, true].map(|is_passing| {
         let wanted = triangles.clone().filter(|&triangle| {
             may_pass(accel.triangle_materials[triangle as usize]) == is_passing
         });
-        Part::own(&vertices, triangles.start, instance, is_passing, wanted)
+        Part::new(vertices.clone(), triangles.start, instance, is_passing, wanted)
     })
 }

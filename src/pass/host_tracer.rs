@@ -24,7 +24,7 @@ use crate::{
     gpu::{
         Buffer, Embree,
         embree_rays::{LANES, Packet},
-        embree_scene::EmbreeScene,
+        embree_scene::{EmbreeScene, Search},
     },
     shader::{
         constants::{NO_INSTANCE, NO_MATERIAL, NO_TRIANGLE, PATH_LISTS},
@@ -207,7 +207,7 @@ impl Closest<'_> {
         let mut paths = [0; LANES];
         paths[..packet.places().len()].copy_from_slice(packet.places());
         chances.clear();
-        tree.find_closest(packet, self.is_coherent, &mut |met| {
+        tree.find(Search::Closest, packet, self.is_coherent, &mut |met| {
             let Some(passages) = passages else { return true };
             let (goes_on, weight) = self.chances.take(paths[met.lane], met, &passages.passing(met));
             chances.push(Chance {
@@ -306,7 +306,7 @@ impl Visible<'_> {
     fn follow(&self, packet: &mut Packet) {
         let Rays { tree, passages } = self.rays;
         let mut passed = [Vec3::ONE; LANES];
-        tree.find_any(packet, &mut |met| {
+        tree.find(Search::Any, packet, false, &mut |met| {
             let Some(passages) = passages else { return true };
             passed[met.lane] *= passages.passing(met).passed;
             passed[met.lane] == Vec3::ZERO
