@@ -37,13 +37,6 @@ float log1p(float x) {
     return 2.0 * s * (1.0 + s2 * tail);
 }
 
-// amplitude * exp(bandwidth * (dot(direction, axis) - 1)); 20 bytes in scalar layout.
-struct Lobe {
-    vec3 axis;
-    float bandwidth;
-    float amplitude;
-};
-
 // Kernel, computed as exp(-bandwidth |direction - axis|^2 / 2).
 float kernel_value(vec3 axis, float bandwidth, vec3 direction) {
     vec3 d = direction - axis;
@@ -69,17 +62,6 @@ float kernel_part_of_ratio(float bandwidth, float ratio) {
     float blend = clamp(0.5 + 0.5 * ratio, 0.0, 1.0);
     float e = exp(-bandwidth);
     return (e + (1.0 - e) * blend) / (1.0 + e);
-}
-
-// Product of two lobes, again a lobe. [Tsai & Shih 2006].
-Lobe lobe_product(Lobe a, Lobe b) {
-    vec3 d = a.axis - b.axis;
-    vec3 u = a.bandwidth * a.axis + b.bandwidth * b.axis;
-    float bandwidth = length(u);
-    vec3 axis = bandwidth > 1e-20 ? u / bandwidth : a.axis;
-    float sum = max(a.bandwidth + b.bandwidth + bandwidth, 1e-20);
-    float exponent = -a.bandwidth * (b.bandwidth / sum) * dot(d, d);
-    return Lobe(axis, bandwidth, a.amplitude * b.amplitude * exp(exponent));
 }
 
 // Two unit vectors that complete the axis to a right-handed frame. [Duff et al. 2017].

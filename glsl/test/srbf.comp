@@ -5,8 +5,8 @@
 #include "test/answers.glsl"
 
 struct Input {
-    Lobe a;
-    Lobe b;
+    vec3 axis;
+    float bandwidth;
     vec3 direction;
     vec2 u;
     float x;
@@ -19,25 +19,22 @@ struct Output {
     float steepness;
     float hemisphere_part;
     float value;
-    Lobe product;
     float distance;
     vec3 sampled;
     float pdf;
 };
 
 Output answer(Input given) {
-    Lobe a = given.a;
     Output result;
     result.expm1_x = expm1(given.x);
     result.log1p_x = log1p(max(given.x, -0.9999));
-    result.integral = kernel_integral(a.bandwidth);
-    result.steepness = kernel_steepness(a.bandwidth);
-    result.hemisphere_part = kernel_part_of_ratio(a.bandwidth, dot(a.axis, given.direction));
-    result.value = kernel_value(a.axis, a.bandwidth, given.direction);
-    result.product = lobe_product(a, given.b);
-    result.distance = kernel_sample_distance(a.bandwidth, given.u.x);
-    result.sampled = kernel_sample(a.axis, a.bandwidth, given.u);
-    result.pdf = kernel_pdf(a.axis, a.bandwidth, given.direction);
+    result.integral = kernel_integral(given.bandwidth);
+    result.steepness = kernel_steepness(given.bandwidth);
+    result.hemisphere_part = kernel_part_of_ratio(given.bandwidth, dot(given.axis, given.direction));
+    result.value = kernel_value(given.axis, given.bandwidth, given.direction);
+    result.distance = kernel_sample_distance(given.bandwidth, given.u.x);
+    result.sampled = kernel_sample(given.axis, given.bandwidth, given.u);
+    result.pdf = kernel_pdf(given.axis, given.bandwidth, given.direction);
     return result;
 }
 
