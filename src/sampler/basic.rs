@@ -57,8 +57,8 @@ impl Basic {
             (CONSTANT_CANDIDATES, self.candidates(parameters)?),
             compensation,
         ];
-        let steps = RaySteps::new("sample", &own, surfaces);
-        Ok(if self.tag == SAMPLER_MIS { steps.with_escape(&[compensation]) } else { steps })
+        let escape = (self.tag == SAMPLER_MIS).then(|| vec![compensation]);
+        Ok(RaySteps { escape, ..RaySteps::new("sample", &own, surfaces) })
     }
 }
 

@@ -10,13 +10,17 @@ use crate::{
 /// The pass, and where it departs from other samplers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RaySteps {
-    sample: Kernel,
+    pub(super) sample: Kernel,
     /// Pass that counts the rays, for a technique to learn from.
-    learn: Option<Kernel>,
-    rays: Option<[u32; 2]>,
-    shares_paths: bool,
-    roulette: Option<Roulette>,
-    escape: Option<Vec<(u32, u32)>>,
+    pub(super) learn: Option<Kernel>,
+    /// Shadow rays at the first and at later vertices, if fewer than the most.
+    pub(super) rays: Option<[u32; 2]>,
+    /// True if the pixels of a cohort share paths.
+    pub(super) shares_paths: bool,
+    /// Where paths end by chance, if not as the settings say.
+    pub(super) roulette: Option<Roulette>,
+    /// Specialization of `gather`, if bounce rays that escape are samples of the environment too.
+    pub(super) escape: Option<Vec<(u32, u32)>>,
 }
 
 impl RaySteps {
@@ -38,26 +42,6 @@ impl RaySteps {
     pub(super) fn learning(self, shader: &'static str, constants: &[(u32, u32)]) -> Self {
         let learn = Some(Kernel::new(shader, Domain::ShadowRays, constants));
         Self { learn, escape: None, ..self }
-    }
-
-    /// Returns the same steps with other numbers of shadow rays at the first and at later vertices.
-    pub(super) fn with_rays(self, rays: [u32; 2]) -> Self {
-        Self { rays: Some(rays), ..self }
-    }
-
-    /// Returns the same steps with or without shared paths.
-    pub(super) fn with_sharing(self, shares_paths: bool) -> Self {
-        Self { shares_paths, ..self }
-    }
-
-    /// Returns the same steps with another roulette.
-    pub(super) fn with_roulette(self, roulette: Roulette) -> Self {
-        Self { roulette: Some(roulette), ..self }
-    }
-
-    /// Returns the same steps where bounce rays that escape are samples of the environment too.
-    pub(super) fn with_escape(self, constants: &[(u32, u32)]) -> Self {
-        Self { escape: Some(constants.to_vec()), ..self }
     }
 }
 

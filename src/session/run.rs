@@ -86,7 +86,7 @@ pub struct Session {
     /// Metadata without samples and times.
     description: Metadata,
     /// Duration aimed at for a pass.
-    pace: Duration,
+    pub pace: Duration,
     /// Samples and seconds of the last pass.
     last_pass: Option<(u32, f64)>,
     /// True if a checkpoint of this render lies on the disk.
@@ -155,12 +155,6 @@ impl Session {
             relative_error: None,
             found_light: false,
         }
-    }
-
-    /// Aims at another duration of a pass.
-    #[must_use]
-    pub fn with_pace(self, pace: Duration) -> Self {
-        Self { pace, ..self }
     }
 
     fn reset(&mut self) {

@@ -45,7 +45,8 @@ impl Side {
             Some(buffers) => Renderer::with_scene_buffers(device, buffers, scene, settings)?,
             None => Renderer::new(device, scene, settings)?,
         };
-        let mut session = Session::of(renderer, device, scene).with_pace(PICTURE_TIME);
+        let mut session = Session::of(renderer, device, scene);
+        session.pace = PICTURE_TIME;
         if let Some(bytes) = guide.filter(|_| sampler.has_guide()) {
             let path = "guide".as_ref();
             session.renderer.take_guide(Saved { path, bytes, continues: false })?;

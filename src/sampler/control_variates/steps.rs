@@ -35,7 +35,7 @@ pub fn steps(parameters: &Parameters, grid: RecordGrid, surfaces: Surfaces) -> R
     ];
     let own = [&own[..], &grid.constants()].concat();
     // Light that `sample_controlled` adds to a path is in no shadow ray that a pixel could share.
-    Ok(RaySteps::new("sample_controlled", &own, surfaces).with_sharing(false))
+    Ok(RaySteps { shares_paths: false, ..RaySteps::new("sample_controlled", &own, surfaces) })
 }
 
 /// Returns the steps of the pilot, or [`crate::Error::Usage`] as those of `mis` do.

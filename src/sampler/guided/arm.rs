@@ -208,13 +208,22 @@ impl Arms {
     pub(super) fn steps(&self, arm: &Arm) -> Box<dyn Steps> {
         let roulette = Roulette { throughput: arm.roulette_throughput, ..self.roulette };
         if arm.is_guided {
-            let steps = self.guided.clone().with_candidates(arm.candidates);
-            let steps = steps.with_sharing(arm.shares_paths).with_rays(arm.rays);
-            let steps = steps.with_bounces(arm.guides_bounces).with_roulette(roulette);
-            Box::new(if arm.guides_later { steps } else { steps.with_later(self.mis.clone()) })
+            Box::new(GuidedSteps {
+                candidates: arm.candidates,
+                shares_paths: arm.shares_paths,
+                rays: arm.rays,
+                guides_bounces: arm.guides_bounces && arm.guides_later,
+                later: (!arm.guides_later).then(|| self.mis.clone()),
+                roulette,
+                ..self.guided.clone()
+            })
         } else {
-            let steps = self.mis.clone().with_rays(arm.rays).with_sharing(arm.shares_paths);
-            Box::new(steps.with_roulette(roulette))
+            Box::new(RaySteps {
+                rays: Some(arm.rays),
+                shares_paths: arm.shares_paths,
+                roulette: Some(roulette),
+                ..self.mis.clone()
+            })
         }
     }
 

@@ -22,13 +22,15 @@ pub struct GuidedSteps {
     pub candidates: u32,
     /// True if the pixels of a cohort share paths.
     pub shares_paths: bool,
-    rays: [u32; 2],
-    bounce_candidates: u32,
-    guides_bounces: bool,
+    /// Shadow rays at the first and at later vertices.
+    pub(super) rays: [u32; 2],
+    pub(super) bounce_candidates: u32,
+    /// False where `later` is given: bounces learn from the cells of later vertices.
+    pub(super) guides_bounces: bool,
     /// Steps of later vertices, if those are not guided.
-    later: Option<RaySteps>,
-    surfaces: Surfaces,
-    roulette: Roulette,
+    pub(super) later: Option<RaySteps>,
+    pub(super) surfaces: Surfaces,
+    pub(super) roulette: Roulette,
 }
 
 impl GuidedSteps {
@@ -46,40 +48,9 @@ impl GuidedSteps {
         }
     }
 
-    /// Returns the same steps with another number of candidates.
-    pub fn with_candidates(self, candidates: u32) -> Self {
-        Self { candidates, ..self }
-    }
-
-    /// Returns the same steps with other numbers of shadow rays at the first and at later vertices.
-    pub(super) fn with_rays(self, rays: [u32; 2]) -> Self {
-        Self { rays, ..self }
-    }
-
-    /// Returns the same steps with guided bounces, or those of the BRDF.
-    pub(super) fn with_bounces(self, guides_bounces: bool) -> Self {
-        Self { guides_bounces, ..self }
-    }
-
-    /// Returns the same steps with those of later vertices, and with bounces of the BRDF: those learn from
-    /// the cells of later vertices.
-    pub(super) fn with_later(self, later: RaySteps) -> Self {
-        Self { later: Some(later), guides_bounces: false, ..self }
-    }
-
     /// Returns the steps of a vertex that is not guided.
     fn unguided(&self, vertex: u32) -> Option<&RaySteps> {
         self.later.as_ref().filter(|_| vertex > 0)
-    }
-
-    /// Returns the same steps with another roulette.
-    pub(super) fn with_roulette(self, roulette: Roulette) -> Self {
-        Self { roulette, ..self }
-    }
-
-    /// Returns the same steps with or without shared paths.
-    pub fn with_sharing(self, shares_paths: bool) -> Self {
-        Self { shares_paths, ..self }
     }
 }
 
