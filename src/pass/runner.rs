@@ -365,13 +365,8 @@ impl Runner {
     }
 
     /// The scene on the device.
-    pub(crate) fn scene(&self) -> &SceneBuffers {
+    pub(crate) fn scene(&self) -> &Arc<SceneBuffers> {
         &self.scene
-    }
-
-    /// The scene on the device, to share it.
-    pub(crate) fn shared_scene(&self) -> Arc<SceneBuffers> {
-        Arc::clone(&self.scene)
     }
 
     /// Buffers of the wave.

@@ -162,11 +162,6 @@ impl Sampler {
         self.room().check(parameters, depth)
     }
 
-    /// Returns [`Error::Usage`] for parameters that cannot be rendered in direct light.
-    pub fn check_parameters(self, parameters: &Parameters) -> Result<()> {
-        self.room().check(parameters, 1)
-    }
-
     /// Returns a warning if the sampler and the portals of `scene` have no use for each other.
     pub fn portal_warning(self, scene: &Scene) -> Option<String> {
         let (name, path) = (self.name(), scene.path.display());

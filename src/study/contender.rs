@@ -45,7 +45,7 @@ impl Contender {
         for assignment in parts {
             parameters.set(assignment)?;
         }
-        sampler.check_parameters(&parameters)?;
+        sampler.check(&parameters, 1, &[])?;
         Ok(Self { label: label.to_owned(), sampler, parameters })
     }
 
