@@ -122,10 +122,14 @@ trait Plain: Sized {
     const EXPECTED: &str;
 
     /// Value of a number, if one number is enough.
-    fn from_number(number: f64) -> Option<Self>;
+    fn from_number(_: f64) -> Option<Self> {
+        None
+    }
 
     /// Value of an array of three numbers, if it takes one.
-    fn from_array(array: [f32; 3]) -> Option<Self>;
+    fn from_array(_: [f32; 3]) -> Option<Self> {
+        None
+    }
 }
 
 impl Plain for f32 {
@@ -134,18 +138,10 @@ impl Plain for f32 {
     fn from_number(number: f64) -> Option<Self> {
         Some(number as Self)
     }
-
-    fn from_array(_: [f32; 3]) -> Option<Self> {
-        None
-    }
 }
 
 impl Plain for [f32; 3] {
     const EXPECTED: &str = "an array of three numbers or a table with `texture`";
-
-    fn from_number(_: f64) -> Option<Self> {
-        None
-    }
 
     fn from_array(array: [f32; 3]) -> Option<Self> {
         Some(array)
@@ -188,13 +184,7 @@ impl<'de, T: Plain> Visitor<'de> for TexturedVisitor<T> {
     }
 }
 
-impl<'de> Deserialize<'de> for Textured<f32> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(TexturedVisitor(PhantomData))
-    }
-}
-
-impl<'de> Deserialize<'de> for Textured<[f32; 3]> {
+impl<'de, T: Plain> Deserialize<'de> for Textured<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(TexturedVisitor(PhantomData))
     }
