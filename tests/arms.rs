@@ -2,7 +2,7 @@
 //! expectation.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fs};
 
 use fenestra::{
     film::{Attribute, Image, Statistics, Sums},
@@ -217,7 +217,7 @@ fn files_and_figures_tell_the_arm() {
         let arguments = [&["render", &scene, "-o", output][..], &fixed, options].concat();
         let run = folder.run(&arguments);
         run.assert(0, &[]);
-        let text = std::fs::read_to_string(folder.path().join("stats.json")).unwrap();
+        let text = fs::read_to_string(folder.path().join("stats.json")).unwrap();
         let statistics: Statistics = serde_json::from_str(&text).unwrap();
         (
             run.output + &run.messages,
@@ -234,11 +234,12 @@ fn files_and_figures_tell_the_arm() {
 
     // Record another arm, as another machine may have chosen it.
     let path = folder.path().join("room.guide");
-    let state = GuideState::read(&path).unwrap();
+    let state = GuideState::from_bytes(&fs::read(&path).unwrap(), &path).unwrap();
     let found = state.arm.unwrap();
     assert_eq!(found.to_string(), arm);
     let other = Arm { is_guided: true, candidates: 8, ..found };
-    GuideState { arm: Some(other), ..state }.write(&path).unwrap();
+    let changed = GuideState { arm: Some(other), ..state };
+    fs::write(&path, changed.to_bytes().unwrap()).unwrap();
     let (_, image, statistics) = render("b.exr", &["--spp", "2", "--load-guide", "room.guide"]);
     assert_eq!(statistics.candidates, Some(8));
     assert_eq!(image.attributes["fenestra.candidates"], Attribute::Text("8".to_owned()));

@@ -190,9 +190,9 @@ fn a_guide_may_name_its_environment_in_any_script() {
     let folder = folder();
     folder.run(&[&GUIDED[..], &["--spp=1", "--save-guide=a.guide"]].concat()).assert(0, &[]);
     let path = folder.path().join("a.guide");
-    let mut state = GuideState::read(&path).unwrap();
+    let mut state = GuideState::from_bytes(&fs::read(&path).unwrap(), &path).unwrap();
     state.origin.environment = "дом с окнами на юг".to_owned();
-    state.write(&path).unwrap();
+    fs::write(&path, state.to_bytes().unwrap()).unwrap();
     folder
         .run(&[&GUIDED[..], &["--spp=1", "--load-guide=a.guide"]].concat())
         .assert(2, &["the guide belongs to another environment: map дом с окнами"]);

@@ -17,7 +17,7 @@ use fenestra::{
     },
     session::Settings,
     shader::{
-        constants::{BVH_STACK_ENTRIES, NO_MATERIAL},
+        constants::NO_MATERIAL,
         structs::{Hit, Ray, ShadowRay},
     },
 };
@@ -110,7 +110,6 @@ fn check(name: &str, geometry: &Geometry, rays: &[Ray], free: usize, tolerance: 
     let two_levels = Accel::build(geometry, ONE_PAGE).unwrap();
     let one_level = Accel::build(&flat, ONE_PAGE).unwrap();
     assert!(two_levels.is_instanced() && !one_level.is_instanced());
-    assert!(two_levels.depth <= BVH_STACK_ENTRIES as usize);
     check_host(name, &two_levels, &rays[..free]);
     let on_device = OnDevice::new(&two_levels);
     let found = on_device.trace(rays, Schedule::SINGLE);

@@ -86,8 +86,6 @@ pub struct Accel {
     pub instances: Vec<Record>,
     /// Mesh of each: its place in [`Accel::first_triangles`].
     pub instance_meshes: Vec<u32>,
-    /// Stack entries that traversal may need, at most [`BVH_STACK_ENTRIES`].
-    pub depth: usize,
 }
 
 impl Accel {
@@ -172,7 +170,6 @@ impl Accel {
             first_triangles,
             instances,
             instance_meshes,
-            depth,
         })
     }
 

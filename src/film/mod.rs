@@ -9,6 +9,8 @@ pub mod cryptomatte;
 pub mod denoised;
 pub mod display;
 mod group_sums;
+mod image;
+pub mod layers;
 pub mod merge;
 pub mod metadata;
 pub mod picture;
@@ -25,8 +27,9 @@ pub use self::{
     checkpoint::Checkpoint,
     display::DisplayServer,
     group_sums::GroupSums,
+    layers::Aov,
     metadata::{Metadata, SampleRange},
     statistics::Statistics,
-    sums::{Aov, Sums},
+    sums::Sums,
 };
 pub use fenestra_scene::picture::{Attribute, Image, RgbImage, Window};

@@ -1,138 +1,13 @@
-//! Sums that the device's film holds after `n` samples of every pixel, and the image they give.
+//! Sums that the device's film holds after `n` samples of every pixel.
 
 use std::{array, collections::BTreeSet};
 
-use clap::ValueEnum;
-use rayon::prelude::*;
-
 use super::{
-    Image,
-    cryptomatte::{self, MATERIALS, OBJECTS},
     group_sums::GroupSums,
+    layers::{Aov, COUNTS, COVERAGES, Coverage, TRIPLES},
     reconstruction::weights,
 };
-use crate::shader::constants::{FILM_BLOCK, MATTE_SLOTS};
-
-/// Extra layers of an image file, with pbrt's names and meaning where pbrt has them. The command
-/// line also accepts a layer's name in the file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
-pub enum Aov {
-    /// `Variance.R/G/B`: variance of the pixel mean.
-    #[value(aliases = ["Variance"])]
-    Variance,
-    /// `SampleCount.Y`: camera paths per pixel.
-    #[value(aliases = ["samplecount", "SampleCount"])]
-    SampleCount,
-    /// `Unfiltered.R/G/B`: mean radiance of the samples in the pixel itself, whose noise no neighbour
-    /// shares: what denoisers expect.
-    #[value(aliases = ["Unfiltered"])]
-    Unfiltered,
-    /// `Albedo.R/G/B`: share of light that a surface reflects, 0…1: the first one that is no perfect
-    /// mirror, smooth glass or pane, times what those on the way let through.
-    #[value(aliases = ["Albedo"])]
-    Albedo,
-    /// `N.X/Y/Z`: shading normal of that surface, world space.
-    #[value(aliases = ["N"])]
-    Normal,
-    /// `P.X/Y/Z`: position of the first hit, world space, metres.
-    #[value(aliases = ["P"])]
-    Position,
-    /// `Visible.Y`: share of shadow rays that reached the environment, and `ShadowRays.Y`: how many
-    /// were traced for the pixel.
-    #[value(aliases = ["Visible"])]
-    Visible,
-    /// Sampler `visibility`: `CacheEntries.Y`: directions in the visibility cache after the last
-    /// ray of a hit, mean over the pixel's hits, and `Hits.Y`: how many hits those are.
-    #[value(aliases = ["CacheEntries"])]
-    CacheEntries,
-    /// Sampler `guided`, first hits: `GuideCell.R/G/B`: colour of the cell of learned visibility,
-    /// one for each; `GuideLevel.R/G/B`: share of samples that found only the cell of their face
-    /// (R), a coarse cell (G), a fine one (B).
-    #[value(aliases = ["GuideCell"])]
-    GuideCell,
-    /// `CryptoObject00…02.R/G/B/A`: Cryptomatte of the objects that camera rays meet first, by the
-    /// pixel's own samples: six of them.
-    #[value(aliases = ["CryptoObject"])]
-    CryptoObject,
-    /// `CryptoMaterial00…02.R/G/B/A`: the same of materials.
-    #[value(aliases = ["CryptoMaterial"])]
-    CryptoMaterial,
-    /// `Combined_GROUP.R/G/B`: light of each group of lights, which add up to the picture: `environment`,
-    /// `lamps`, and those that `light_group` names in the scene file, eight at most. Leaves `share-paths`
-    /// off.
-    #[value(aliases = ["LightGroups"])]
-    LightGroups,
-}
-
-impl Aov {
-    /// Name on the command line.
-    pub(crate) fn name(self) -> String {
-        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
-    }
-}
-
-/// Layer of [`Sums`]: the layer of an image file that needs it, none for those that every film has, and
-/// the channels that hold it in a checkpoint.
-pub(crate) struct Layer<const N: usize> {
-    pub aov: Option<Aov>,
-    pub channels: [&'static str; N],
-}
-
-/// Layers of three numbers.
-pub(crate) const TRIPLES: [Layer<3>; 10] = [
-    Layer { aov: None, channels: ["Sum.R", "Sum.G", "Sum.B"] },
-    Layer { aov: None, channels: ["SumCompensation.R", "SumCompensation.G", "SumCompensation.B"] },
-    Layer { aov: None, channels: ["Squares.R", "Squares.G", "Squares.B"] },
-    Layer {
-        aov: None,
-        channels: ["SquaresCompensation.R", "SquaresCompensation.G", "SquaresCompensation.B"],
-    },
-    Layer {
-        aov: Some(Aov::Unfiltered),
-        channels: ["UnfilteredSum.R", "UnfilteredSum.G", "UnfilteredSum.B"],
-    },
-    Layer { aov: Some(Aov::Albedo), channels: ["AlbedoSum.R", "AlbedoSum.G", "AlbedoSum.B"] },
-    Layer { aov: Some(Aov::Normal), channels: ["NSum.X", "NSum.Y", "NSum.Z"] },
-    Layer { aov: Some(Aov::Position), channels: ["PSum.X", "PSum.Y", "PSum.Z"] },
-    Layer {
-        aov: Some(Aov::GuideCell),
-        channels: ["GuideCellSum.R", "GuideCellSum.G", "GuideCellSum.B"],
-    },
-    Layer {
-        aov: Some(Aov::GuideCell),
-        channels: ["GuideLevelSum.R", "GuideLevelSum.G", "GuideLevelSum.B"],
-    },
-];
-
-/// Layers of two counts; leading part and rest of each.
-pub(crate) const COUNTS: [Layer<4>; 2] = [
-    Layer {
-        aov: Some(Aov::Visible),
-        channels: [
-            "ShadowRays.Visible",
-            "ShadowRays.VisibleCompensation",
-            "ShadowRays.Traced",
-            "ShadowRays.TracedCompensation",
-        ],
-    },
-    Layer {
-        aov: Some(Aov::CacheEntries),
-        channels: [
-            "CacheEntries.Entries",
-            "CacheEntries.EntriesCompensation",
-            "CacheEntries.Hits",
-            "CacheEntries.HitsCompensation",
-        ],
-    },
-];
-
-/// Identifiers of objects or materials and the samples that meet them, in the order of their discovery; no
-/// samples where there is none.
-pub type Coverage = [[u32; 2]; MATTE_SLOTS as usize];
-
-/// Layers of coverages, with the channels of each slot.
-pub(crate) const COVERAGES: [(Aov, &str); 2] =
-    [(Aov::CryptoObject, "ObjectCounts"), (Aov::CryptoMaterial, "MaterialCounts")];
+use crate::shader::constants::FILM_BLOCK;
 
 /// A sweep over the film that was stopped on its way: the first blocks have one more sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -423,87 +298,6 @@ impl Sums {
         (0..self.pixel_count()).filter(has_bad).count()
     }
 
-    /// Converts to an image of `R`, `G`, `B` and those of `aovs` whose sums exist.
-    ///
-    /// Albedo, normal and position are means over all samples of the pixel; a sample that leaves
-    /// the scene counts as 0. Deviation: pbrt divides by the weight of the samples that hit
-    /// something, which could not be merged exactly from image files.
-    pub fn to_image(&self, aovs: &[Aov]) -> Image {
-        let mut image = Image::new(self.width, self.height);
-        image.origin = self.origin.map(|value| i32::try_from(value).unwrap_or(i32::MAX));
-        image.film_size = self.film_size;
-        let pixels = || (0..self.pixel_count()).into_par_iter();
-        let narrow = |value: [f64; 3]| value.map(|component| component as f32);
-        let means: Vec<[f32; 3]> = pixels().map(|pixel| narrow(self.mean(pixel))).collect();
-        image.insert_triple(["R", "G", "B"], &means);
-        let insert_means = |image: &mut Image, names: [&str; 3], sums: &[[f32; 3]]| {
-            if !sums.is_empty() {
-                let count = |pixel: usize| f64::from(self.samples(pixel).max(1));
-                let mean =
-                    |pixel: usize| narrow(sums[pixel].map(|sum| f64::from(sum) / count(pixel)));
-                image.insert_triple(names, &pixels().map(mean).collect::<Vec<_>>());
-            }
-        };
-        for aov in aovs {
-            match aov {
-                Aov::Variance => {
-                    let variances: Vec<[f32; 3]> =
-                        pixels().map(|pixel| narrow(self.variance_of_mean(pixel))).collect();
-                    image.insert_triple(["Variance.R", "Variance.G", "Variance.B"], &variances);
-                }
-                Aov::SampleCount => {
-                    let counts = pixels().map(|pixel| self.samples(pixel) as f32).collect();
-                    image.channels.insert("SampleCount.Y".to_owned(), counts);
-                }
-                Aov::Visible => {
-                    insert_ratio(&mut image, ["Visible.Y", "ShadowRays.Y"], &self.visible);
-                }
-                Aov::CacheEntries => {
-                    insert_ratio(&mut image, ["CacheEntries.Y", "Hits.Y"], &self.cache_entries);
-                }
-                Aov::Unfiltered => {
-                    let names = ["Unfiltered.R", "Unfiltered.G", "Unfiltered.B"];
-                    insert_means(&mut image, names, &self.unfiltered);
-                }
-                Aov::Albedo => {
-                    insert_means(&mut image, ["Albedo.R", "Albedo.G", "Albedo.B"], &self.albedo);
-                }
-                Aov::Normal => insert_means(&mut image, ["N.X", "N.Y", "N.Z"], &self.normal),
-                Aov::Position => insert_means(&mut image, ["P.X", "P.Y", "P.Z"], &self.position),
-                Aov::GuideCell => {
-                    let names = ["GuideCell.R", "GuideCell.G", "GuideCell.B"];
-                    insert_means(&mut image, names, &self.guide_cell);
-                    let names = ["GuideLevel.R", "GuideLevel.G", "GuideLevel.B"];
-                    insert_means(&mut image, names, &self.guide_level);
-                }
-                Aov::LightGroups => {
-                    for group in &self.groups {
-                        let mean = |pixel: usize| narrow(self.group_mean(group, pixel));
-                        let names = GroupSums::channels("Combined", &group.name);
-                        let names = names.each_ref().map(String::as_str);
-                        image.insert_triple(names, &pixels().map(mean).collect::<Vec<_>>());
-                    }
-                }
-                Aov::CryptoObject | Aov::CryptoMaterial => {
-                    let [objects, materials] = self.coverages();
-                    let (name, coverages) = match aov {
-                        Aov::CryptoObject => (OBJECTS, objects),
-                        _ => (MATERIALS, materials),
-                    };
-                    if !coverages.is_empty() {
-                        let shares = |pixel: usize| {
-                            let count = f64::from(self.samples(pixel).max(1));
-                            coverages[pixel].map(|[id, own]| (id, f64::from(own) / count))
-                        };
-                        let shares: Vec<_> = pixels().map(shares).collect();
-                        cryptomatte::insert(&mut image, name, &shares);
-                    }
-                }
-            }
-        }
-        image
-    }
-
     /// Adds the samples of `other`, which must show the same window of the same film; neither may be
     /// [`Ahead`] anywhere.
     ///
@@ -564,17 +358,6 @@ fn add_coverage(coverage: &mut Coverage, other: &Coverage) {
         if let Some(own) = coverage.iter_mut().find(|own| own[1] == 0 || own[0] == id) {
             *own = [id, own[1].saturating_add(count)];
         }
-    }
-}
-
-/// Inserts two channels for pairs of counts: first over second, and second; nothing without pairs.
-fn insert_ratio(image: &mut Image, [ratio, whole]: [&str; 2], counts: &[[u32; 2]]) {
-    if !counts.is_empty() {
-        let quotient =
-            |&[part, whole]: &[u32; 2]| (f64::from(part) / f64::from(whole.max(1))) as f32;
-        image.channels.insert(ratio.to_owned(), counts.iter().map(quotient).collect());
-        let wholes = counts.iter().map(|pair| pair[1] as f32).collect();
-        image.channels.insert(whole.to_owned(), wholes);
     }
 }
 

@@ -8,7 +8,7 @@ use crate::{
     error::{Error, Result},
     film::{
         Aov, GroupSums, Sums, Window,
-        sums::{COUNTS, COVERAGES, Coverage, TRIPLES},
+        layers::{COUNTS, COVERAGES, Coverage, TRIPLES},
     },
     gpu::{Buffer, Commands, DescriptorSet, Device},
     memory,

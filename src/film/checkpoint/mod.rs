@@ -18,8 +18,9 @@ use sha2::{Digest, Sha256};
 
 use super::{
     Attribute, GroupSums, Image,
+    layers::{COUNTS, COVERAGES, Coverage, TRIPLES},
     metadata::Metadata,
-    sums::{COUNTS, COVERAGES, Coverage, Sums, TRIPLES, split},
+    sums::{Sums, split},
 };
 use crate::{
     error::{Error, Result},

@@ -20,7 +20,6 @@ pub struct Cells {
     refined: Vec<usize>,
     /// The same by [`CellKey::child_group`].
     refined_by_children: HashMap<u32, usize>,
-    refused: u64,
 }
 
 /// Hierarchy of the cells: faces, coarse cells, fine cells, children of refined cells, and so on.
@@ -48,7 +47,6 @@ impl Cells {
             index_of: HashMap::new(),
             refined: Vec::new(),
             refined_by_children: HashMap::new(),
-            refused: 0,
         }
     }
 
@@ -90,14 +88,9 @@ impl Cells {
         let coarse: Vec<CellKey> =
             keys.iter().filter(|key| !has_refined_parent(key)).map(|key| key.coarse()).collect();
         for key in coarse.into_iter().chain(keys) {
-            if self.index_of.contains_key(&key) {
-                continue;
+            if !self.index_of.contains_key(&key) && self.keys.len() < self.capacity {
+                self.push(key);
             }
-            if self.keys.len() == self.capacity {
-                self.refused += 1;
-                continue;
-            }
-            self.push(key);
         }
     }
 
@@ -142,11 +135,6 @@ impl Cells {
     /// Indices of the refined cells.
     pub fn refined(&self) -> &[usize] {
         &self.refined
-    }
-
-    /// Number of times that a cell found no room, the same cell again at every attempt.
-    pub fn refused(&self) -> u64 {
-        self.refused
     }
 
     /// Parent of a cell: a refined cell, else its coarse cell; of a coarse cell its face.

@@ -167,11 +167,6 @@ impl Guide {
         self.counts.par_iter().map(trials).sum::<u64>() / u64::from(PARTS_PER_RAY)
     }
 
-    /// Number of times that a cell found no room, the same cell again at every rebuild.
-    pub fn refused(&self) -> u64 {
-        self.cells.refused()
-    }
-
     /// Adds counts of one stretch of passes per cell and region, in the order of the cells as they
     /// were, trials and hits in rays; `counted` starts with pair `first` of cell and region.
     ///

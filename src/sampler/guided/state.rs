@@ -3,7 +3,7 @@
 //! A file is one line of JSON, then [packed](super::packing) words: the arrays of [`GuideState`] from
 //! `rectangles` on, in their order. The header holds the SHA-256 of both.
 
-use std::{io::Write, path::Path};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -17,7 +17,7 @@ use crate::sampler::guided::{
 };
 use crate::{
     error::{Error, Result},
-    files::{self, hexadecimal, write_atomically},
+    files::hexadecimal,
     memory,
     shader::rooms::guided::GUIDE_COUNT_WORDS,
 };
@@ -151,15 +151,6 @@ impl GuideState {
         u32::from_le_bytes([digest[0], digest[1], digest[2], digest[3]])
     }
 
-    /// Writes the state to a file.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if the file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<()> {
-        let bytes = self.to_bytes().map_err(|source| Error::io(path, "write", source))?;
-        write_atomically(path, |file| file.write_all(&bytes))
-    }
-
     /// Returns the content of the state's file.
     ///
     /// # Errors
@@ -193,19 +184,10 @@ impl GuideState {
         Ok(bytes)
     }
 
-    /// Reads a state from a file.
-    ///
-    /// # Errors
-    /// [`Error::Io`] if the file cannot be read; [`Error::Format`] if it is not a guide, of another
-    /// version, or damaged.
-    pub fn read(path: &Path) -> Result<Self> {
-        Self::from_bytes(&files::read(path)?, path)
-    }
-
     /// Reads a state from the content of its file; `path` only serves error messages.
     ///
     /// # Errors
-    /// As [`GuideState::read`].
+    /// [`Error::Format`] if it is not a guide, of another version, or damaged.
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
         let no_guide = || {
             Error::format(path, "not a guide; expected a file written by --save-guide".to_owned())
@@ -305,8 +287,6 @@ impl GuideState {
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
-    use std::fs;
-
     use super::*;
 
     fn arm() -> Arm {
@@ -352,26 +332,21 @@ mod tests {
         }
     }
 
+    fn read(bytes: &[u8]) -> Result<GuideState> {
+        GuideState::from_bytes(bytes, Path::new("room.guide"))
+    }
+
     #[test]
     fn a_state_survives_a_file() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("new/room.guide");
-        state().write(&path).unwrap();
-        assert_eq!(GuideState::read(&path).unwrap(), state());
+        assert_eq!(read(&state().to_bytes().unwrap()).unwrap(), state());
     }
 
     #[test]
     fn damaged_files_are_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("room.guide");
-        let message = |bytes: &[u8]| {
-            fs::write(&path, bytes).unwrap();
-            GuideState::read(&path).unwrap_err().to_string()
-        };
+        let message = |bytes: &[u8]| read(bytes).unwrap_err().to_string();
         assert!(message(b"").contains("not a guide"));
         assert!(message(b"{\"format\":\"other\"}\n").contains("not a guide"));
-        state().write(&path).unwrap();
-        let good = fs::read(&path).unwrap();
+        let good = state().to_bytes().unwrap();
         assert!(message(&good[..good.len() - 1]).contains("damaged guide"));
         let version = format!("\"version\":{VERSION}").into_bytes();
         let mut other = good.clone();
@@ -409,13 +384,11 @@ mod tests {
         // Sums that would overflow to infinities, and these to densities that are no numbers
         for light in [f32::INFINITY, f32::NAN, -1.0, 1e30] {
             let arrivals = vec![[3.0_f32.to_bits(), light.to_bits()]];
-            GuideState { arrivals, ..state() }.write(&path).unwrap();
-            let error = GuideState::read(&path).unwrap_err().to_string();
+            let error = message(&GuideState { arrivals, ..state() }.to_bytes().unwrap());
             assert!(error.contains("impossible amounts of light"), "{light}: {error}");
         }
         let arrivals = vec![[0; 2]; 3 * ARRIVAL_DIRECTIONS + 1];
-        GuideState { arrivals, ..state() }.write(&path).unwrap();
-        let error = GuideState::read(&path).unwrap_err().to_string();
+        let error = message(&GuideState { arrivals, ..state() }.to_bytes().unwrap());
         assert!(error.contains("more cells than it has"), "{error}");
     }
 }
