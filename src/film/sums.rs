@@ -72,7 +72,7 @@ pub struct Sums {
     /// Numbers of first hits whose cell was that of their face, a coarse one, a fine one; empty if
     /// not asked for.
     pub guide_level: Vec<[f32; 3]>,
-    /// Samples by object, by [`cryptomatte::identifier`]; empty if not asked for.
+    /// Samples by object, by [`identifier`](super::cryptomatte::identifier); empty if not asked for.
     pub objects: Vec<Coverage>,
     /// Samples by material; empty if not asked for.
     pub materials: Vec<Coverage>,
