@@ -45,23 +45,22 @@ const MOST_GRID_CELLS: u64 = 1 << 19;
 /// Edge of the cells that others fall back on, in cells.
 const COARSE: u32 = 4;
 /// Most shadow rays of all cells together, and of these for each cluster.
-const MOST_RAYS: usize = 1 << 20;
-const RAYS_PER_CLUSTER: usize = 1 << 12;
+const MOST_RAYS: usize = 1 << 21;
+const RAYS_PER_CLUSTER: usize = 1 << 13;
 /// Most clusters that a cell looks at closely.
 const MOST_TRIED: usize = 48;
 /// Most entries of a list.
 const MOST_ENTRIES: usize = 32;
-/// Places of a cell that rays start from, and rays of each to a cluster.
-const PLACES: usize = 4;
-const RAYS_PER_PLACE: u32 = 2;
+/// Places of a cell that rays start from, one to each cluster: rooms share a cell, so few places see all.
+const PLACES: usize = 16;
 /// Visibility before any ray, and the rays that it is worth.
 const PRIOR: [f32; 2] = [0.1, 0.25];
 /// Exponent of the visibility in the weight of a cluster.
 const VISIBILITY_EXPONENT: f32 = 0.75;
-/// Least factor on the weight of a candidate.
+/// Least visibility that a choice counts with: rays from a few places miss what others see.
 const LEAST_VISIBILITY: f32 = 0.05;
 /// Range of the probability that a lamp is drawn by power alone.
-const BY_POWER: [f64; 2] = [0.05, 0.5];
+const BY_POWER: [f64; 2] = [0.1, 0.5];
 /// Surfaces that light passes, on the way to a lamp.
 const MOST_PASSED: u32 = 8;
 /// Separates these random numbers from all others.
@@ -112,6 +111,7 @@ struct Estimate<'a> {
     /// Estimate without looking.
     score: f64,
     weight: f64,
+    /// Factor on the weight by what rays see.
     visibility: f32,
 }
 
@@ -176,7 +176,7 @@ impl LampCells {
     /// Makes the lists of a scene for the clusters of `tables`, of which there are some.
     pub(super) fn new(scene: &Scene, accel: &Accel, tables: &LampTables) -> Self {
         let (clusters, total) = (&tables.clusters[..], tables.total);
-        let rays = MOST_TRIED.min(clusters.len()) * PLACES * RAYS_PER_PLACE as usize;
+        let rays = MOST_TRIED.min(clusters.len()) * PLACES;
         let survey = Survey {
             accel,
             tables,
@@ -459,28 +459,26 @@ impl Survey<'_> {
         let (mut sum, mut rays, mut hits) = (0.0, 0.0, 0.0);
         let column = estimate.cluster.columns.start;
         for (number, place) in (0_u32..).zip(places) {
-            for ray in 0..RAYS_PER_PLACE {
-                let numbers = hash_4d([label, column, number * RAYS_PER_PLACE + ray, SEED]);
-                let light = self.light(estimate.cluster, place.position, numbers);
-                let cosine = light.direction.dot(place.normal);
-                if light.irradiance <= 0.0 || cosine <= 0.0 {
-                    continue;
-                }
-                let squared = light.distance * light.distance;
-                let clamped = if squared < least { squared / least } else { 1.0 };
-                sum += light.irradiance * clamped * (0.1 + 0.9 * cosine);
-                rays += 1.0;
-                let (direction, mut origin) = (light.direction, place.position);
-                origin = moved_off_surface(origin, place.normal, direction, self.offset);
-                if self.stops(&mut origin, direction, light.distance).is_none() {
-                    hits += 1.0;
-                }
+            let numbers = hash_4d([label, column, number, SEED]);
+            let light = self.light(estimate.cluster, place.position, numbers);
+            let cosine = light.direction.dot(place.normal);
+            if light.irradiance <= 0.0 || cosine <= 0.0 {
+                continue;
+            }
+            let squared = light.distance * light.distance;
+            let clamped = if squared < least { squared / least } else { 1.0 };
+            sum += light.irradiance * clamped * (0.1 + 0.9 * cosine);
+            rays += 1.0;
+            let (direction, mut origin) = (light.direction, place.position);
+            origin = moved_off_surface(origin, place.normal, direction, self.offset);
+            if self.stops(&mut origin, direction, light.distance).is_none() {
+                hits += 1.0;
             }
         }
         let [prior, worth] = PRIOR;
         let visibility = (hits + worth * prior) / (rays + worth);
-        estimate.visibility = visibility;
-        estimate.weight = f64::from(sum * visibility.powf(VISIBILITY_EXPONENT));
+        estimate.visibility = visibility.max(LEAST_VISIBILITY).powf(VISIBILITY_EXPONENT);
+        estimate.weight = f64::from(sum * estimate.visibility);
     }
 }
 
@@ -534,7 +532,7 @@ fn list_of(
             ratio: (own * total / estimate.cluster.power + by_power) as f32,
             first: columns.start,
             count: columns.end - columns.start,
-            visibility: estimate.visibility.max(LEAST_VISIBILITY).powf(VISIBILITY_EXPONENT),
+            visibility: estimate.visibility,
         });
         before = end.min(u64::from(u32::MAX));
     }
