@@ -71,8 +71,6 @@ void start_ray(uint path) {
 void main() {
     uint ray_count = listed_path_count();
     uint first = gl_WorkGroupID.x * WORKGROUP_SIZE * RAYS_PER_INVOCATION + gl_LocalInvocationID.x;
-    uint found[RAYS_PER_INVOCATION];
-    uint found_instances[RAYS_PER_INVOCATION];
 
     uint turn = 0u;
     uint steps = 0u;
@@ -94,13 +92,14 @@ void main() {
             && steps < TRAVERSAL_STEP_LIMIT);
         if (!running || steps >= TRAVERSAL_STEP_LIMIT) {
             given_up |= running ? 1u << turn : 0u;
-            if (HAS_PASSAGES && !running && bvh_triangle != NO_TRIANGLE
-                && goes_through(listed_path(first + turn * WORKGROUP_SIZE))) {
+            uint path = listed_path(first + turn * WORKGROUP_SIZE);
+            if (HAS_PASSAGES && !running && bvh_triangle != NO_TRIANGLE && goes_through(path)) {
                 continue;
             }
-            found[turn] = bvh_triangle;
+            // Not in an array of the lane: drivers repeat the evaluation of a surface for each of its elements.
+            hits[path].triangle = bvh_triangle;
             if (HAS_INSTANCES) {
-                found_instances[turn] = bvh_hit_instance;
+                hit_instances[path] = bvh_hit_instance;
             }
             turn++;
             has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
@@ -118,11 +117,8 @@ void main() {
     for (turn = 0u; turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count; turn++) {
         uint path = listed_path(first + turn * WORKGROUP_SIZE);
         Ray ray = load_ray(path);
-        uint triangle = ANSWERED == 0u ? found[turn] : hits[path].triangle;
-        uint instance = NO_INSTANCE;
-        if (HAS_INSTANCES) {
-            instance = ANSWERED == 0u ? found_instances[turn] : hit_instances[path];
-        }
+        uint triangle = hits[path].triangle;
+        uint instance = HAS_INSTANCES ? hit_instances[path] : NO_INSTANCE;
         if (triangle == NO_TRIANGLE) {
             hits[path] = no_surface();
         } else {
@@ -131,9 +127,6 @@ void main() {
                 ? hit.material
                 : NO_MATERIAL;
             hits[path] = hit;
-            if (HAS_INSTANCES) {
-                hit_instances[path] = instance;
-            }
         }
     }
 }

@@ -19,6 +19,7 @@ use crate::{
     gpu::{Capabilities, Device, Tracer, lavapipe},
     self_test,
     shader::spirv,
+    stage,
     terminal::say,
 };
 
@@ -79,6 +80,7 @@ pub(crate) fn check(capabilities: &Capabilities) -> Result<()> {
     if record.as_ref().is_some_and(|path| path.exists()) {
         return Ok(());
     }
+    stage::enter("testing the device, once");
     match test(capabilities.index, LONGEST) {
         Verdict::Passed => {
             let text = format!("{} ({})\n", capabilities.name, capabilities.driver);

@@ -7,7 +7,7 @@ use ash::vk;
 use super::{
     Called, descriptors::DescriptorSet, device::Device, labels, pipelines::Made, vulkan_error,
 };
-use crate::{error::Result, shader::spirv::used_bindings};
+use crate::{error::Result, shader::spirv::used_bindings, stage};
 
 /// A compute pipeline.
 pub struct Pipeline {
@@ -83,6 +83,7 @@ fn compile(
     constants: &[(u32, u32)],
     layout: vk::PipelineLayout,
 ) -> Result<vk::Pipeline> {
+    stage::enter(format_args!("compiling {name}"));
     let raw_device = &device.raw;
     let module_info = vk::ShaderModuleCreateInfo::default().code(words);
     // SAFETY: `words` is SPIR-V that the build compiled.
