@@ -84,6 +84,8 @@ pub(crate) struct Worker {
     shrinking: f32,
     /// Number of cameras so far, for the seeds.
     looks: u32,
+    /// Seed of the settings, for the first film at rest: that shows what `render` writes.
+    own_seed: Option<u32>,
     learned_at: Instant,
     adapted_at: Instant,
     /// Time that the last rebuild took; none is tried in motion before one at rest.
@@ -124,6 +126,7 @@ pub(super) struct Parts {
 impl Worker {
     pub(crate) fn new(parts: Parts) -> Self {
         let is_software = parts.device.capabilities().kind == "software";
+        let seed = parts.settings.seed;
         let mut worker = Self {
             rig: Rig::new(parts.scene.camera),
             views: views(&parts.folder, &parts.scene.name),
@@ -136,6 +139,7 @@ impl Worker {
             motion: Motion::Rest,
             shrinking: if is_software { 8.0 } else { 2.0 },
             looks: 0,
+            own_seed: Some(seed),
             learned_at: Instant::now(),
             adapted_at: Instant::now(),
             learning_time: None,
@@ -169,6 +173,8 @@ impl Worker {
     /// A failing device, a lost display, a file that cannot be written.
     pub(crate) fn run(&mut self) -> Result<()> {
         self.tell();
+        // A small film shows the scene at once; the whole one takes seconds on a software device.
+        self.start_moving()?;
         let mut last = Instant::now();
         loop {
             self.parts.panel.borrow_mut().attend();
@@ -193,12 +199,7 @@ impl Worker {
                 moved = true;
             }
             if moved {
-                if self.motion == Motion::Rest {
-                    self.denoising.start_moving();
-                }
-                self.motion = Motion::Moving(Instant::now());
-                self.parts.panel.borrow_mut().is_moving = true;
-                self.move_on()?;
+                self.start_moving()?;
             } else if let Motion::Moving(since) = self.motion {
                 if since.elapsed() >= REST {
                     self.motion = Motion::Rest;
@@ -217,6 +218,16 @@ impl Worker {
         }
     }
 
+    /// Shows the scene through a camera that moves from now on.
+    fn start_moving(&mut self) -> Result<()> {
+        if self.motion == Motion::Rest {
+            self.denoising.start_moving();
+        }
+        self.motion = Motion::Moving(Instant::now());
+        self.parts.panel.borrow_mut().is_moving = true;
+        self.move_on()
+    }
+
     fn sides(&mut self) -> impl Iterator<Item = &mut Side> {
         [Some(&mut self.parts.left), self.right.as_mut()].into_iter().flatten()
     }
@@ -233,7 +244,9 @@ impl Worker {
     /// Starts all films again through the camera of now.
     fn look(&mut self, size: [u32; 2], learns: bool) -> Result<()> {
         self.looks = self.looks.wrapping_add(1);
-        let [seed, ..] = hash_4d([self.parts.settings.seed, self.looks, MOVED_SEED, 0]);
+        let [moved, ..] = hash_4d([self.parts.settings.seed, self.looks, MOVED_SEED, 0]);
+        let own = if self.motion == Motion::Rest { self.own_seed.take() } else { None };
+        let seed = own.unwrap_or(moved);
         self.error = None;
         let camera = self.rig.camera;
         let start = Instant::now();
