@@ -96,7 +96,7 @@ void main() {
             if (HAS_PASSAGES && !running && bvh_triangle != NO_TRIANGLE && goes_through(path)) {
                 continue;
             }
-            // Not in an array of the lane: drivers repeat the evaluation of a surface for each of its elements.
+            // Not in an array of the lane: drivers repeat the evaluation of a surface for each element.
             hits[path].triangle = bvh_triangle;
             if (HAS_INSTANCES) {
                 hit_instances[path] = bvh_hit_instance;
