@@ -51,7 +51,7 @@ const RAYS_PER_CLUSTER: usize = 1 << 13;
 const MOST_TRIED: usize = 48;
 /// Most entries of a list.
 const MOST_ENTRIES: usize = 32;
-/// Places of a cell that rays start from, one to each cluster: rooms share a cell, so few places see all.
+/// Places of a cell that rays start from, one to each cluster. Four may all lie in the next room.
 const PLACES: usize = 16;
 /// Visibility before any ray, and the rays that it is worth.
 const PRIOR: [f32; 2] = [0.1, 0.25];
