@@ -51,6 +51,8 @@ pub struct Runner {
     most_shadow_rays: u32,
     wave_paths: u32,
     totals: Totals,
+    /// Most that a counter of the device can hold.
+    uncounted: u64,
     compile_ms: PassTimes,
     watch: Option<Watch>,
     is_stopped: bool,
@@ -101,6 +103,7 @@ impl Runner {
             settings,
             passes: BTreeMap::new(),
             totals: Totals::default(),
+            uncounted: 0,
             compile_ms: PassTimes::new(),
             watch: None,
             is_stopped: false,
@@ -169,7 +172,6 @@ impl Runner {
     /// those of a window whose sums cannot go on. Fails if the device does.
     pub(crate) fn sweep(&mut self, technique: &dyn Passes, wave: Wave, pixels: u32) -> Result<u32> {
         let mut done = 0;
-        let mut uncounted = 0;
         while done < pixels {
             let together =
                 (self.wave_paths / wave.sample_count / BLOCK_PIXELS).max(1) * BLOCK_PIXELS;
@@ -193,10 +195,10 @@ impl Runner {
                     break;
                 }
             }
-            uncounted += u64::from(wave.pixel_count * wave.sample_count) * self.counts_per_path();
-            if uncounted > COUNTER_ROOM {
+            let paths = u64::from(wave.pixel_count * wave.sample_count);
+            self.uncounted += paths * self.counts_per_path(technique.steps());
+            if self.uncounted > COUNTER_ROOM {
                 self.take_counters()?;
-                uncounted = 0;
             }
         }
         Ok(done)
@@ -229,9 +231,9 @@ impl Runner {
         Kernel::new("accumulate", Domain::Pixels, &[]).with_light_groups(self.settings.light_groups)
     }
 
-    /// Most that one path adds to a counter: energy counts up to 256 at a vertex.
-    fn counts_per_path(&self) -> u64 {
-        u64::from(self.settings.shadow_rays.max(256)) * u64::from(self.settings.depth)
+    /// Most that one path adds to a counter.
+    fn counts_per_path(&self, steps: &dyn Steps) -> u64 {
+        u64::from(self.settings.shadow_rays.max(steps.counts())) * u64::from(self.settings.depth)
     }
 
     /// Runs one wave for `vertices` vertices; returns device ms by pass. All pixels lie in one page of
@@ -335,6 +337,7 @@ impl Runner {
 
     /// Adds the device's counts to the totals. Fails if the device does.
     pub(crate) fn take_counters(&mut self) -> Result<()> {
+        self.uncounted = 0;
         self.totals.add(&self.film.take_counters()?);
         Ok(())
     }

@@ -29,6 +29,11 @@ pub trait Steps {
         false
     }
 
+    /// Most that a vertex of a path adds to a counter, but for its shadow rays.
+    fn counts(&self) -> u32 {
+        1
+    }
+
     /// Passes before the first group of shadow rays of a vertex.
     fn prepare(&self, _wave: &Wave) -> Vec<Kernel> {
         Vec::new()

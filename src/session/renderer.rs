@@ -108,6 +108,8 @@ impl Renderer {
             let context = Context { scene, parameters: &settings.parameters, runner: &runner };
             let technique = settings.sampler.technique(context)?;
             runner.warm_up(technique.as_ref())?;
+            // Room for what comes back from a device with memory of its own.
+            runner.take_counters()?;
             Ok((runner, technique))
         };
         let mut most_paths = passes.most_paths;
@@ -135,6 +137,11 @@ impl Renderer {
     /// Adds `samples` samples to every pixel, the rest of a stopped sweep first. A crop window that needs
     /// samples around it ends its sweep: it does not keep those. Fails if the device does.
     pub fn render_pass(&mut self, samples: u32) -> Result<()> {
+        self.sweep(samples)?;
+        self.runner.take_counters()
+    }
+
+    fn sweep(&mut self, samples: u32) -> Result<()> {
         let mut left = samples;
         while left > 0 {
             let progress = self.progress();
@@ -156,7 +163,6 @@ impl Renderer {
             let wave = self.technique.complete(wave, &progress);
             let pixels = self.runner.film().padded_pixels() - wave.first_pixel;
             let done = self.runner.sweep(self.technique.as_ref(), wave, pixels)?;
-            self.runner.take_counters()?;
             if done < pixels {
                 let blocks = before.blocks + done / BLOCK_PIXELS;
                 let offset = shared_offset(self.filter(), wave.first_sample, wave.seed);

@@ -58,6 +58,11 @@ impl ProductSteps {
 }
 
 impl Steps for ProductSteps {
+    /// The energy of the lobes that were kept, in 256ths of all.
+    fn counts(&self) -> u32 {
+        256
+    }
+
     fn prepare(&self, _wave: &Wave) -> Vec<Kernel> {
         let by_coefficient = self.parameters.order == LobeOrder::Coefficient;
         vec![self.kernel(

@@ -47,6 +47,10 @@ impl VisibilitySteps {
 }
 
 impl Steps for VisibilitySteps {
+    fn counts(&self) -> u32 {
+        self.product.counts()
+    }
+
     fn traces(&self) -> bool {
         true
     }
