@@ -191,6 +191,15 @@ vec3 front_normal(uint triangle, uint instance) {
     return instance_winding(instance) * cross(b - a, c - a);
 }
 
+// A vertex in the frame of a ray, as `to_local`. `precise`: devices that fuse multiplications and additions
+// otherwise round a vertex in one way for one triangle, and in another for the next.
+vec3 projected(Frame frame, vec3 vertex) {
+    precise vec3 local = vec3(frame.tangent.x, frame.bitangent.x, frame.normal.x) * vertex.x
+        + vec3(frame.tangent.y, frame.bitangent.y, frame.normal.y) * vertex.y
+        + vec3(frame.tangent.z, frame.bitangent.z, frame.normal.z) * vertex.z;
+    return local;
+}
+
 // Twice the signed areas of the three sub-triangles around the ray, given the vertices in its
 // frame: barycentric coordinates before division by their sum. All have one sign if the ray passes
 // inside.
@@ -292,13 +301,13 @@ void bvh_test_triangle(bool any_hit) {
     uint bit = uint(findMSB(bvh_triangles_waiting.y));
     bvh_triangles_waiting.y &= ~(1u << bit);
     uint triangle = bvh_triangles_waiting.x + bit;
-    vec3 a = to_local(bvh_frame, bvh_corner(triangle, 0u) - bvh_origin);
-    vec3 b = to_local(bvh_frame, bvh_corner(triangle, 1u) - bvh_origin);
-    vec3 c = to_local(bvh_frame, bvh_corner(triangle, 2u) - bvh_origin);
+    vec3 a = projected(bvh_frame, bvh_corner(triangle, 0u) - bvh_origin);
+    vec3 b = projected(bvh_frame, bvh_corner(triangle, 1u) - bvh_origin);
+    vec3 c = projected(bvh_frame, bvh_corner(triangle, 2u) - bvh_origin);
     vec3 areas = edge_functions(a, b, c);
     float area = areas.x + areas.y + areas.z;
     // A weighted mean of the vertices' distances lies within the triangle, however badly conditioned.
-    float distance = (areas.x * a.z + areas.y * b.z + areas.z * c.z) / area;
+    precise float distance = (areas.x * a.z + areas.y * b.z + areas.z * c.z) / area;
     bool inside = min(areas.x, min(areas.y, areas.z)) >= 0.0
         || max(areas.x, max(areas.y, areas.z)) <= 0.0;
     float least = HAS_PASSAGES ? bvh_passed_distance : 0.0;
@@ -411,9 +420,9 @@ vec3 visible_normal(vec3 shading_normal, vec3 geometric_normal, vec3 direction) 
 // Barycentric coordinates of the point where a ray meets the plane of `triangle`.
 vec3 barycentric(uint triangle, uint instance, vec3 origin, vec3 direction) {
     Frame frame = frame_from_normal(direction);
-    vec3 a = to_local(frame, triangle_corner(triangle, 0u, instance) - origin);
-    vec3 b = to_local(frame, triangle_corner(triangle, 1u, instance) - origin);
-    vec3 c = to_local(frame, triangle_corner(triangle, 2u, instance) - origin);
+    vec3 a = projected(frame, triangle_corner(triangle, 0u, instance) - origin);
+    vec3 b = projected(frame, triangle_corner(triangle, 1u, instance) - origin);
+    vec3 c = projected(frame, triangle_corner(triangle, 2u, instance) - origin);
     vec3 areas = edge_functions(a, b, c);
     return areas / (areas.x + areas.y + areas.z);
 }
@@ -441,9 +450,9 @@ Hit surface_at(uint triangle, uint instance, vec3 origin, vec3 direction) {
         c = map_point(x, y, z, c);
     }
     Frame frame = frame_from_normal(direction);
-    vec3 a_local = to_local(frame, a - origin);
-    vec3 b_local = to_local(frame, b - origin);
-    vec3 c_local = to_local(frame, c - origin);
+    vec3 a_local = projected(frame, a - origin);
+    vec3 b_local = projected(frame, b - origin);
+    vec3 c_local = projected(frame, c - origin);
     vec3 areas = edge_functions(a_local, b_local, c_local);
     float area = areas.x + areas.y + areas.z;
     vec3 weights = areas / area;

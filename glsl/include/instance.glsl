@@ -19,9 +19,11 @@ uvec4 instance_places(uint instance) {
     return texelFetch(instances, int(INSTANCE_TEXELS * instance + 6u));
 }
 
-// Affine map of a point by its three rows.
+// Affine map of a point by its three rows; `precise` as `projected` is.
 vec3 map_point(vec4 x, vec4 y, vec4 z, vec3 point) {
-    return vec3(dot(x.xyz, point) + x.w, dot(y.xyz, point) + y.w, dot(z.xyz, point) + z.w);
+    precise vec3 mapped = vec3(x.x, y.x, z.x) * point.x + vec3(x.y, y.y, z.y) * point.y
+        + vec3(x.z, y.z, z.z) * point.z + vec3(x.w, y.w, z.w);
+    return mapped;
 }
 
 vec3 map_vector(vec4 x, vec4 y, vec4 z, vec3 vector) {
