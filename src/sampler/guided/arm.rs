@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{cost::GUIDED_CANDIDATES, parameters::GuidedParameters, steps::GuidedSteps};
 use crate::{
     error::Result,
+    gpu::Capabilities,
     pass::{PassSettings, Roulette, Steps},
     sampler::{Parameters, basic, rays::RaySteps},
 };
@@ -53,8 +54,8 @@ pub(super) struct Work {
     pub(super) shadow_rays: f64,
 }
 
-/// Microseconds of a core for parts of the work, measured on lavapipe; only their ratios count. A clock would
-/// know the machine better, but not be the same in every run.
+/// Times for parts of the work, of which only the ratios count. A clock would know the machine better, but
+/// not be the same in every run.
 struct Prices {
     ray: f64,
     shadow_ray: f64,
@@ -67,7 +68,8 @@ struct Prices {
     cohort: f64,
 }
 
-const PRICES: Prices = Prices {
+/// Microseconds of a core on lavapipe.
+const SOFTWARE_PRICES: Prices = Prices {
     ray: 2.0,
     shadow_ray: 0.2,
     direction: 0.4,
@@ -76,21 +78,31 @@ const PRICES: Prices = Prices {
     cohort: 3.0,
 };
 
-impl Arm {
-    /// Returns the microseconds that a path takes on average.
-    pub(super) fn time(&self, work: Work) -> f64 {
-        let [first, later] = self.rays.map(f64::from);
+/// Nanoseconds of an H100 in five scenes: rays are dear, and choosing their directions is cheap.
+const GPU_PRICES: Prices = Prices {
+    ray: 1.8,
+    shadow_ray: 0.56,
+    direction: 0.11,
+    guided_candidates: [0.13, 0.06],
+    guided_bounce: 0.12,
+    cohort: 2.9,
+};
+
+impl Prices {
+    /// Returns the time that a path of `arm` takes on average.
+    fn time(&self, arm: &Arm, work: Work) -> f64 {
+        let [first, later] = arm.rays.map(f64::from);
         let (rays, shadow_rays) = (work.rays / work.paths, work.shadow_rays / work.paths);
         let direction = |is_guided| {
-            let [one, more] = PRICES.guided_candidates;
-            let guided = one + more * f64::from(self.candidates - 1);
-            if is_guided { guided } else { PRICES.direction }
+            let [one, more] = self.guided_candidates;
+            let guided = one + more * f64::from(arm.candidates - 1);
+            if is_guided { guided } else { self.direction }
         };
-        let directions = first * direction(self.is_guided)
-            + (rays - 1.0) * later * direction(self.is_guided && self.guides_later);
-        let bounce = if self.guides_bounces { PRICES.guided_bounce } else { 0.0 };
-        let cohort = if self.shares_paths { PRICES.cohort } else { 0.0 };
-        rays * (PRICES.ray + bounce) + shadow_rays * PRICES.shadow_ray + directions + cohort
+        let directions = first * direction(arm.is_guided)
+            + (rays - 1.0) * later * direction(arm.is_guided && arm.guides_later);
+        let bounce = if arm.guides_bounces { self.guided_bounce } else { 0.0 };
+        let cohort = if arm.shares_paths { self.cohort } else { 0.0 };
+        rays * (self.ray + bounce) + shadow_rays * self.shadow_ray + directions + cohort
     }
 }
 
@@ -136,6 +148,7 @@ pub(super) enum Axes {
 
 /// The arms of one render: settings that are given, and those that a measurement may decide.
 pub(super) struct Arms {
+    prices: &'static Prices,
     guided: GuidedSteps,
     mis: RaySteps,
     roulette: Roulette,
@@ -152,7 +165,12 @@ pub(super) struct Arms {
 
 impl Arms {
     /// Returns the arms of a render. Fails for candidates that `guided` does not support.
-    pub(super) fn new(parameters: &Parameters, settings: &PassSettings) -> Result<Self> {
+    pub(super) fn new(
+        parameters: &Parameters,
+        settings: &PassSettings,
+        capabilities: &Capabilities,
+    ) -> Result<Self> {
+        let is_software = capabilities.kind == "software";
         let own = parameters.guided;
         let candidates = first_candidates(parameters)?;
         let (most, has_paths) = (settings.shadow_rays, settings.depth > 1);
@@ -181,6 +199,7 @@ impl Arms {
         let has_own_bounces =
             own.bounce_candidates != GuidedParameters::default().bounce_candidates;
         Ok(Self {
+            prices: if is_software { &SOFTWARE_PRICES } else { &GPU_PRICES },
             guided: GuidedSteps::new(candidates, own, settings),
             mis: basic::MIS.steps(parameters, settings.surfaces)?,
             roulette: settings.roulette,
@@ -197,6 +216,11 @@ impl Arms {
                 && has_paths
                 && settings.roulette == Roulette::default(),
         })
+    }
+
+    /// Returns the time that a path of `arm` takes on average, in the unit of the device's prices.
+    pub(super) fn time(&self, arm: &Arm, work: Work) -> f64 {
+        self.prices.time(arm, work)
     }
 
     /// The arm before any measurement.

@@ -45,7 +45,7 @@ pub struct ArmCost {
     pub rays: f64,
     /// Shadow rays of a path.
     pub shadow_rays: f64,
-    /// Time that this work is worth, microseconds.
+    /// Time that this work is worth by the device's prices: microseconds of a core, or nanoseconds of a GPU.
     pub time: f64,
     /// Device milliseconds for one sample of every pixel, for comparison.
     pub ms_per_sample: f64,
@@ -66,7 +66,7 @@ impl fmt::Display for ArmCost {
         let Self { arm, time, ms_per_sample, relative_variance, trimmed_variance, .. } = self;
         write!(
             formatter,
-            "{arm}: {time:.2} µs a path ({ms_per_sample:.2} ms a sample), relative variance \
+            "{arm}: {time:.2} a path ({ms_per_sample:.2} ms a sample), relative variance \
              {relative_variance:.3} ({trimmed_variance:.3} trimmed), cost {:.2} ±{:.0}%",
             self.relative_cost,
             100.0 * self.log_error
@@ -204,7 +204,7 @@ fn median(values: &[f64]) -> f64 {
 #[derive(Default)]
 struct Runner {
     spread: Spread,
-    /// Microseconds of a path, by round.
+    /// Time of a path, by round.
     times: Vec<f64>,
     cost: ArmCost,
 }

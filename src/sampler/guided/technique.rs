@@ -70,7 +70,7 @@ impl Room for GuidedRoom {
             shadow_rays: settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP),
             has_bounces: own.guides_bounces(settings.depth),
         };
-        let arms = Arms::new(parameters, settings)?;
+        let arms = Arms::new(parameters, settings, runner.device().capabilities())?;
         let arm = arms.first(false);
         Ok(Box::new(Guided {
             buffers: GuideBuffers::new(runner.device(), scene, &own, size)?,
