@@ -331,7 +331,11 @@ fn nodes_and_densities_are_those_of_the_twin() {
             assert!(above as usize * 3 > nodes.len(), "{level}, path {path}: {above} nodes");
             let product = Product::new(&paths.tree, paths.level(), nodes);
             let samples = paths.samples(path, 1, SAMPLES / 5, true);
-            assert!(close(product.total(), samples[0].1.total, 1e-4), "{level}, path {path}");
+            let total = samples[0].1.total;
+            assert!(
+                close(product.total(), total, 3e-4),
+                "{level}, path {path}: {total}, {product:?}"
+            );
             // Rounding decides at the edges of nodes.
             let differs = |(query, answer): &&(Query, Answer)| {
                 let (direction, pdf) = product.sample(query.direction_numbers.into());

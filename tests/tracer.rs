@@ -15,6 +15,7 @@ use fenestra::{
 use glam::{DVec3, Vec3};
 
 use crate::support::{
+    self,
     command::{BALL, Folder, Run, program, yard},
     random::Random,
     rays::{ONE_PAGE, OnDevice, REFILLING, ray},
@@ -163,17 +164,21 @@ reflectance = [0.5, 0.5, 0.5]"#;
         command.args(["-o", "yard.exr"]).env("FENESTRA_EMBREE", library);
         Run::of(&command.output().unwrap())
     };
+    for (tracer, library) in [("auto", "/nonexistent"), ("device", "")] {
+        render(tracer, library).assert(0, &[]);
+        assert_eq!(tracer_of(&folder), "device");
+    }
+    let run = render("host", "");
+    if support::device().capabilities().kind != "software" {
+        run.assert(75, &["does not share its memory with the host", "take --tracer device"]);
+        return;
+    }
     folder.write("libnothing.so", "");
     render("host", "/nonexistent").assert(
         75,
         &["tracing on the host needs the library Embree", "/nonexistent", "help: ", "./setup"],
     );
     render("host", "libnothing.so").assert(75, &["libnothing.so", "help: "]);
-    for (tracer, library) in [("auto", "/nonexistent"), ("device", "")] {
-        render(tracer, library).assert(0, &[]);
-        assert_eq!(tracer_of(&folder), "device");
-    }
-    let run = render("host", "");
     if run.status == Some(0) {
         assert!(tracer_of(&folder).starts_with("Embree "), "{}", tracer_of(&folder));
         run.assert(0, &["rays by Embree "]);

@@ -91,6 +91,11 @@ fn check_tracer(
     assert_eq!(on_device.overruns(), 0, "{name}");
     let size =
         geometry.positions.iter().flatten().fold(0.0, |size: f64, x| size.max(x.abs().into()));
+    // GPUs fuse multiplications and additions, and divide by approximations.
+    let is_software = device().capabilities().kind == "software";
+    let slack = |distance: f64| {
+        1e-5 * distance + if is_software { 0.0 } else { 2e-5 * distance + 2e-6 * size }
+    };
     let mut doubtful = 0;
     for (index, (ray, hit)) in rays.iter().zip(&single).enumerate() {
         let twin = accel.closest(ray.origin.into(), ray.direction.into());
@@ -99,13 +104,13 @@ fn check_tracer(
         let (expected, is_doubtful) = brute_force(geometry, ray);
         let agrees = match (found, &twin) {
             (Some(distance), Some(twin)) => {
-                (distance - f64::from(twin.distance)).abs() <= 1e-5 * distance
+                (distance - f64::from(twin.distance)).abs() <= slack(distance)
             }
             (found, twin) => found.is_none() == twin.is_none(),
         };
         // The twin decides as the device where rounding decides.
         assert!(
-            agrees || is_doubtful && tracer == "host",
+            agrees || is_doubtful && (tracer == "host" || !is_software),
             "{name}, ray {index} {ray:?}: {hit:?}, twin {twin:?}"
         );
         if is_doubtful {
