@@ -225,7 +225,6 @@ fn everything_that_an_obj_file_loses_is_named_once() {
     let found = warnings(&scene);
     let expected = [
         "ignored vertex colours (2, first in line 2)",
-        "ignored materials that no library describes (`lost`, line 13): they are white",
         "ignored points and lines (line 15): `p`, `l`",
         "ignored `cstype` (line 16)",
         "ignored smoothing groups `s` (line 7): where faces have no normals",
@@ -240,6 +239,7 @@ fn everything_that_an_obj_file_loses_is_named_once() {
         "ignored option `-blendu` (material `paint`, room.mtl:15)",
         "ignored colour and strength of `Ks` (material `paint`): Fresnel's equations give the \
          gloss of plastic",
+        "ignored materials that no library describes (`lost`, line 13): they are white",
         "ignored faces without a material (the first faces): grey, 0.5; in a `.toml` \
          scene an error",
     ];

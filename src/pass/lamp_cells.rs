@@ -31,6 +31,7 @@ use crate::{
         },
         structs::{Lamp, LampEntry},
     },
+    stage,
 };
 
 /// Cube faces that a normal can be nearest to.
@@ -176,6 +177,7 @@ impl LampCells {
     /// Makes the lists of a scene for the clusters of `tables`, of which there are some.
     pub(super) fn new(scene: &Scene, accel: &Accel, tables: &LampTables) -> Self {
         let (clusters, total) = (&tables.clusters[..], tables.total);
+        stage::enter(format_args!("looking for {} groups of lamps", clusters.len()));
         let rays = MOST_TRIED.min(clusters.len()) * PLACES;
         let survey = Survey {
             accel,

@@ -30,7 +30,7 @@ fn gltf_material(folder: &Folder, material: &str, rest: &str) -> (Material, Vec<
     let text = gltf_of(&[positions(), uvs], 3, material, rest);
     let mut warnings = Vec::new();
     let mesh = Mesh::read(&folder.write("a.gltf", text), &mut warnings).unwrap();
-    warnings.extend(mesh.ignored_in_materials().warnings("a.gltf".as_ref()));
+    warnings.extend(mesh.ignored_in_materials(|_| false).warnings("a.gltf".as_ref()));
     (mesh.materials[0].material.clone(), warnings)
 }
 
@@ -505,7 +505,7 @@ fn mtl_material(folder: &Folder, keys: &str) -> (Material, Vec<String>) {
     let mut warnings = Vec::new();
     let mesh = Mesh::read(&folder.write("a.obj", text), &mut warnings).unwrap();
     assert_eq!(mesh.uvs[0], [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
-    warnings.extend(mesh.ignored_in_materials().warnings("a.obj".as_ref()));
+    warnings.extend(mesh.ignored_in_materials(|_| false).warnings("a.obj".as_ref()));
     (mesh.materials[0].material.clone(), warnings)
 }
 
@@ -567,7 +567,7 @@ fn names_do_not_leave_the_folder_of_the_scene() {
     let leave_out = |text: String, expected: &str| {
         let mut warnings = Vec::new();
         let mesh = Mesh::read(&folder.write("scene/a.obj", text), &mut warnings).unwrap();
-        warnings.extend(mesh.ignored_in_materials().warnings("a.obj".as_ref()));
+        warnings.extend(mesh.ignored_in_materials(|_| false).warnings("a.obj".as_ref()));
         assert!(warnings.iter().any(|text| text.contains(expected)), "{warnings:?}");
         assert!(!warnings.iter().any(|text| text.contains("top secret")), "{warnings:?}");
         assert!(mesh.materials[0].material.surface.color.is_none());

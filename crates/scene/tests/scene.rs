@@ -739,8 +739,8 @@ fn lamps_and_objects_name_groups_of_lights() {
 #[test]
 fn an_included_file_is_placed_with_its_materials() {
     let folder = Folder::new();
-    let library = "newmtl wall\nKd 0.1 0.2 0.3\nnewmtl glass\nKd 1 1 1\n";
-    folder.write("parts/room.mtl", library);
+    // No library describes the glass, which is replaced.
+    folder.write("parts/room.mtl", "newmtl wall\nKd 0.1 0.2 0.3\n");
     let square = SQUARE.replace("f 1", "mtllib room.mtl\nusemtl wall\nf 1");
     folder.write("parts/room.obj", format!("{square}usemtl glass\nf 1 2 3\n"));
     let include = "

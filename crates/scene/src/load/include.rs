@@ -1,6 +1,9 @@
 //! `[[include]]`: everything in a file of another format, placed in the scene.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use glam::Vec3;
 
@@ -36,7 +39,7 @@ impl Loader<'_> {
         self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
         let path = self.folder.join(file);
         let Contents { materials: own_materials, geometry: mut placed, mut lamps } =
-            self.contents(&label, &path, inputs, warnings)?;
+            self.contents(&label, &path, replaced, inputs, warnings)?;
         for name in replaced.keys() {
             let is_there = own_materials.iter().any(|material| material.name == *name);
             self.check(is_there, || {
@@ -181,6 +184,7 @@ impl Loader<'_> {
         &self,
         label: &str,
         path: &Path,
+        replaced: &BTreeMap<String, String>,
         inputs: &mut Vec<PathBuf>,
         warnings: &mut Vec<String>,
     ) -> Result<Contents> {
@@ -202,7 +206,7 @@ impl Loader<'_> {
         let mut mesh = Mesh::read_at(path, self.time, None, Some(Budget::default()), warnings)?;
         inputs.push(path.to_path_buf());
         inputs.extend_from_slice(&mesh.side_files);
-        let mut ignored = mesh.ignored_in_materials();
+        let mut ignored = mesh.ignored_in_materials(|name| replaced.contains_key(name));
         for (index, camera) in mesh.cameras.iter().enumerate() {
             ignored.add(features::GLTF_CAMERAS, || camera.label(index));
         }

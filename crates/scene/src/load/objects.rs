@@ -390,7 +390,7 @@ fn ignored_in_object(mesh: &Mesh, own_materials: bool) -> Ignored {
         ignored.add(features::GLTF_OBJECT_LIGHTS, || format!("light `{}`", lamp.name));
     }
     if own_materials {
-        ignored.merge(&mesh.ignored_in_materials());
+        ignored.merge(&mesh.ignored_in_materials(|_| false));
     }
     ignored
 }

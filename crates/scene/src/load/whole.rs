@@ -39,7 +39,7 @@ impl Loader<'_> {
         let mut warnings = Vec::new();
         let budget = Some(Budget::default());
         let mesh = Mesh::read_at(self.path, self.time, self.variant, budget, &mut warnings)?;
-        let mut ignored = mesh.ignored_in_materials();
+        let mut ignored = mesh.ignored_in_materials(|_| false);
         let chosen = self.choose_camera(&mesh.cameras, camera, &mut ignored)?;
         let (materials, geometry) = self.place_whole(&mesh, &mut ignored, &mut warnings)?;
         warnings.extend(ignored.warnings(self.path));

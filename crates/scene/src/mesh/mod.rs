@@ -211,11 +211,13 @@ impl Mesh {
         self.normals.iter_mut().flatten().for_each(|component| *component = -*component);
     }
 
-    /// Parts that the materials in use hold and that are left out.
-    pub fn ignored_in_materials(&self) -> Ignored {
+    /// Parts that the materials in use hold and that are left out, but for those whose name `is_replaced`.
+    pub fn ignored_in_materials(&self, is_replaced: impl Fn(&str) -> bool) -> Ignored {
         let mut ignored = Ignored::default();
-        for material in self.used_materials() {
-            ignored.merge(&material.ignored);
+        for MeshMaterial { material, ignored: own, .. } in self.used_materials() {
+            if !is_replaced(&material.name) {
+                ignored.merge(own);
+            }
         }
         ignored
     }

@@ -265,14 +265,10 @@ impl ObjReader {
         let material = if let Some(&index) = self.library_indices.get(name) {
             self.library[index].finish(&mut self.images, warnings)
         } else {
-            let place = || format!("`{name}`, line {}", self.line);
-            self.ignored.add(features::OBJ_UNDESCRIBED, place);
+            let mut ignored = Ignored::default();
+            ignored.add(features::OBJ_UNDESCRIBED, || format!("`{name}`, line {}", self.line));
             let kind = MaterialKind::Diffuse { reflectance: Vec3::ONE };
-            MeshMaterial {
-                material: Material::new(name, kind),
-                ignored: Ignored::default(),
-                is_culled: false,
-            }
+            MeshMaterial { material: Material::new(name, kind), ignored, is_culled: false }
         };
         let index = self.mesh.materials.len();
         self.mesh.materials.push(material);
