@@ -2,7 +2,7 @@
 """Compares the error of Fenestra's and Mitsuba 3's pictures after the same time.
 
     python3 docs/peers/equal_time.py scenes/*.toml [--seconds 60] [--seeds 3] [--depth 6]
-        [--size 320x240] [--fenestra target/release/fenestra] [--variant llvm_ad_rgb]
+        [--size 320x240] [--fenestra target/release/fenestra] [--variant llvm_ad_rgb] [--call 16]
 
 Exports every scene by `fenestra export --format mitsuba` and lets both programs render it in turns, with
 several seeds: Fenestra with its defaults, Mitsuba by `path` with the same number of vertices, its own
@@ -27,10 +27,6 @@ import subprocess
 import sys
 import tempfile
 import time
-
-# Samples per pixel of one call of Mitsuba.
-CALL = 16
-
 
 def fenestra(binary, scene, arguments, seed, folder):
     """Returns picture and samples per pixel of a render."""
@@ -61,6 +57,7 @@ class Mitsuba:
             film = scene.sensors()[0].film()
             assert tuple(film.size()) == (int(width), int(height)), film.size()
             self.scenes[sampler] = scene
+        self.spp = arguments.call
         self.sampler = "independent"
         self.path = mi.load_dict({"type": "path", "max_depth": arguments.depth + 1})
         for sampler in self.scenes:
@@ -78,7 +75,7 @@ class Mitsuba:
     def call(self, sampler, seed):
         """Returns the picture of one call."""
         return self.numpy.array(
-            self.mi.render(self.scenes[sampler], integrator=self.path, seed=seed, spp=CALL))
+            self.mi.render(self.scenes[sampler], integrator=self.path, seed=seed, spp=self.spp))
 
     def render(self, seconds, seed):
         """Returns the mean of as many calls as fit into the time, and their samples per pixel."""
@@ -88,7 +85,7 @@ class Mitsuba:
             count += 1
             spent = time.perf_counter() - begun
             if spent * (count + 1) / count > seconds:
-                return total / count, count * CALL
+                return total / count, count * self.spp
 
 
 def relative_variance(numpy, pictures):
@@ -109,6 +106,7 @@ def main():
     parser.add_argument("--size", default="320x240")
     parser.add_argument("--fenestra", default="target/release/fenestra")
     parser.add_argument("--variant", default="llvm_ad_rgb")
+    parser.add_argument("--call", type=int, default=16, help="samples per pixel of a call of Mitsuba")
     arguments = parser.parse_args()
     try:
         import mitsuba as mi
