@@ -29,8 +29,6 @@ use crate::{
 /// the cost of a submission.
 const SHORT_DISPATCH_MS: f64 = 50.0;
 const LONG_DISPATCH_MS: f64 = 100.0;
-/// Counts after which the 32-bit counters are read: one more wave must fit.
-const COUNTER_ROOM: u64 = 1 << 30;
 
 /// Share of living paths, of all at later vertices, below which the passes there walk lists of them.
 const MOST_LIVING: f64 = 0.4;
@@ -51,7 +49,7 @@ pub struct Runner {
     most_shadow_rays: u32,
     wave_paths: u32,
     totals: Totals,
-    /// Most that a counter of the device can hold.
+    /// Most that a counter of the device can hold since they were read.
     uncounted: u64,
     compile_ms: PassTimes,
     watch: Option<Watch>,
@@ -195,11 +193,6 @@ impl Runner {
                     break;
                 }
             }
-            let paths = u64::from(wave.pixel_count * wave.sample_count);
-            self.uncounted += paths * self.counts_per_path(technique.steps());
-            if self.uncounted > COUNTER_ROOM {
-                self.take_counters()?;
-            }
         }
         Ok(done)
     }
@@ -231,9 +224,11 @@ impl Runner {
         Kernel::new("accumulate", Domain::Pixels, &[]).with_light_groups(self.settings.light_groups)
     }
 
-    /// Most that one path adds to a counter.
+    /// Most that one path adds to a counter: rays to environment and lamps at all vertices, and to its cohort.
     fn counts_per_path(&self, steps: &dyn Steps) -> u64 {
-        u64::from(self.settings.shadow_rays.max(steps.counts())) * u64::from(self.settings.depth)
+        let PassSettings { shadow_rays, depth, cohort_edge, .. } = self.settings;
+        let at_vertex = (2 * shadow_rays).max(steps.counts());
+        u64::from(at_vertex) * u64::from(depth) + u64::from(cohort_edge * cohort_edge)
     }
 
     /// Runs one wave for `vertices` vertices; returns device ms by pass. All pixels lie in one page of
@@ -255,6 +250,12 @@ impl Runner {
         vertices: u32,
         accumulates: bool,
     ) -> Result<PassTimes> {
+        let paths = u64::from(wave.pixel_count * wave.sample_count);
+        let counts = paths * self.counts_per_path(technique.steps());
+        if self.uncounted + counts > u64::from(u32::MAX) {
+            self.take_counters()?;
+        }
+        self.uncounted += counts;
         let film_start = self.film.first_pixel(wave.first_pixel);
         let wave = Wave { film_start, ..wave };
         let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
