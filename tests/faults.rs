@@ -280,7 +280,7 @@ fn hangups_and_terminations_are_interrupts() {
 fn an_interrupt_ends_a_render_within_a_sample() {
     let folder = folder();
     // A sample takes longer than the quarter of a second that an interrupt leaves it.
-    let [size, rays] = if support::device().capabilities().kind == "software" {
+    let [size, rays] = if support::is_software() {
         ["--size=640x480", "--shadow-rays=64"]
     } else {
         ["--size=3840x2160", "--shadow-rays=1024"]
@@ -454,5 +454,7 @@ fn shared_and_damaged_pipelines_change_no_picture() {
         let mut damaged = bytes.clone();
         damaged[bytes.len() / 2] ^= 0x10;
         assert!(anew != damaged, "{} is written anew", path.display());
+        // Drivers of GPUs fill their cache as they please.
+        assert!(anew.len() == bytes.len() || !support::is_software(), "{}", path.display());
     }
 }

@@ -118,7 +118,7 @@ fn check(name: &str, geometry: &Geometry, rays: &[Ray], free: usize, tolerance: 
     let expected = OnDevice::new(&one_level).trace(rays, REFILLING);
     let (mut same, mut met, mut elsewhere, mut turned) = (0, 0, 0, 0);
     // Where GPUs round otherwise than the twin, that decides at edges.
-    let rounds_alike = support::device().capabilities().kind == "software";
+    let rounds_alike = support::is_software();
     let (compared, most_unlike, near) =
         if rounds_alike { (rays.len(), 0, 1e-5) } else { (free, free / 500, tolerance) };
     let mut unlike_twin = 0;

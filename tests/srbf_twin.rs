@@ -102,9 +102,9 @@ fn shader_twin_agrees_over_the_whole_range() {
         let distance = srbf::kernel_sample_distance(input.bandwidth, input.u.x);
         check("distance", shader.distance, distance, 5e-6);
         let sampled = srbf::kernel_sample(input.axis, input.bandwidth, input.u);
-        // Near the antipode the cosine says little about the angle.
+        // Near the antipode the cosine, which GPUs round otherwise, says little about the angle.
         let from_antipode = (1.0 + sampled.dot(input.axis)).max(1e-6).sqrt();
-        let tolerance = 5e-6 + 4e-7 / from_antipode;
+        let tolerance = if support::is_software() { 5e-6 } else { 5e-6 + 4e-7 / from_antipode };
         assert!(shader.sampled.distance(sampled) < tolerance, "{input:?} {shader:?}");
         let inverse = srbf::kernel_inverse(input.axis, input.bandwidth, shader.sampled);
         assert!((inverse.x - input.u.x).abs() < 5e-4, "{input:?} {shader:?}");

@@ -169,7 +169,7 @@ reflectance = [0.5, 0.5, 0.5]"#;
         assert_eq!(tracer_of(&folder), "device");
     }
     let run = render("host", "");
-    if support::device().capabilities().kind != "software" {
+    if !support::is_software() {
         run.assert(75, &["does not share its memory with the host", "take --tracer device"]);
         return;
     }
