@@ -224,7 +224,7 @@ impl Runner {
         Kernel::new("accumulate", Domain::Pixels, &[]).with_light_groups(self.settings.light_groups)
     }
 
-    /// Most that one path adds to a counter: rays to environment and lamps at all vertices, and to its cohort.
+    /// Most that one path adds to a counter: rays to environment and lamps at vertices, and to its cohort.
     fn counts_per_path(&self, steps: &dyn Steps) -> u64 {
         let PassSettings { shadow_rays, depth, cohort_edge, .. } = self.settings;
         let at_vertex = (2 * shadow_rays).max(steps.counts());
