@@ -67,6 +67,9 @@ pub enum Command {
     /// Test a device, in a process that its driver may crash.
     #[command(hide = true)]
     SelfTest(command::self_test::Arguments),
+    /// Compile kernels for another process.
+    #[command(hide = true)]
+    Compile(command::compile::Arguments),
 }
 
 /// True if the arguments hold `--set help`, which needs no scene.
@@ -101,6 +104,7 @@ pub fn run(arguments: Vec<OsString>) -> u8 {
     if let Some(bytes) = cli.max_memory {
         memory::set_limit(bytes);
     }
+    command::compile::allow();
     // The pool, if any, lives until the command has ended.
     let result = command::start_threads().and_then(|_pool| match &cli.command {
         Command::Render(arguments) => command::render::run(arguments),
@@ -118,6 +122,7 @@ pub fn run(arguments: Vec<OsString>) -> u8 {
         Command::Completions(arguments) => command::completions::run(arguments, Cli::command()),
         Command::Manual(arguments) => command::completions::manual(arguments, Cli::command()),
         Command::SelfTest(arguments) => command::self_test::run(arguments),
+        Command::Compile(arguments) => command::compile::run(arguments),
     });
     match result {
         Ok(()) => 0,

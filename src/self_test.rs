@@ -18,7 +18,7 @@ use crate::{
     },
     scene::{Geometry, Instance},
     shader::{
-        bindings::{Binding, BindingTable, FILM, SCENE, WAVE, film, wave as bindings},
+        bindings::{FILM, SCENE, WAVE, film, wave as bindings},
         constants::{NO_TRIANGLE, PATH_LISTS},
         structs::{Counters, Hit, PathState, Ray, ShadowRay, Wave},
     },
@@ -180,9 +180,9 @@ impl Answers {
             (bindings::SHADOW_RAY_TEXELS, &shadow_rays),
             (bindings::VISIBILITY, &visibility),
         ];
-        let scene = filled(device, &SCENE, &geometry.bindings(), &spare)?;
-        let path_set = filled(device, &WAVE, &path_buffers, &spare)?;
-        let shadow_set = filled(device, &WAVE, &shadow_buffers, &spare)?;
+        let scene = DescriptorSet::filled(device, &SCENE, &geometry.bindings(), &spare)?;
+        let path_set = DescriptorSet::filled(device, &WAVE, &path_buffers, &spare)?;
+        let shadow_set = DescriptorSet::filled(device, &WAVE, &shadow_buffers, &spare)?;
         let film = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &counters)])?;
         let wave = Wave {
             pixel_count: count as u32,
@@ -221,20 +221,6 @@ impl Answers {
             overruns: counters.download::<Counters>(1)?[0].traversal_overruns,
         })
     }
-}
-
-/// Makes a set of `table` with `buffers`, and with `spare` for all others.
-fn filled(
-    device: &Arc<Device>,
-    table: &'static BindingTable,
-    buffers: &[(Binding, &Buffer)],
-    spare: &Buffer,
-) -> Result<DescriptorSet> {
-    let is_free =
-        |binding: &&Binding| !buffers.iter().any(|(other, _)| other.number == binding.number);
-    let mut all = buffers.to_vec();
-    all.extend(table.bindings.iter().filter(is_free).map(|binding| (*binding, spare)));
-    DescriptorSet::new(device, table, &all)
 }
 
 /// Point `index` of a sequence that fills the cube −1…1 evenly: multiples of powers of the root of

@@ -2,11 +2,14 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use std::process::Stdio;
+use std::{fs, process::Stdio};
 
 use fenestra::film::Image;
 
-use crate::support::command::{Folder, Run, program};
+use crate::support::{
+    command::{self, Folder, Run, program},
+    is_software,
+};
 
 /// Makes an image of one colour.
 fn image(width: u32, height: u32, value: f32) -> Image {
@@ -79,7 +82,7 @@ fn shells_and_man_are_served() {
     }
     folder.run(&["manual", "pages/man1"]).assert(0, &[]);
     let page = folder.path().join("pages/man1/fenestra-render.1");
-    let page = std::fs::read_to_string(page).unwrap();
+    let page = fs::read_to_string(page).unwrap();
     // A group, and the text of an option that `-h` hides.
     assert!(page.contains("STOPPING") && page.contains("to render disjoint parts for"), "{page}");
     assert!(!folder.path().join("pages/man1/fenestra-self-test.1").exists(), "it is hidden");
@@ -131,7 +134,7 @@ fn a_missing_file_is_named() {
 #[test]
 fn a_truncated_or_foreign_image_is_named() {
     let folder = images();
-    let bytes = std::fs::read(folder.path().join("a.exr")).unwrap();
+    let bytes = fs::read(folder.path().join("a.exr")).unwrap();
     for length in [0, 3, bytes.len() / 2, bytes.len() - 1] {
         folder.write("short.exr", &bytes[..length]);
         let run = folder.run(&["compare", "short.exr", "b.exr"]);
@@ -164,7 +167,7 @@ fn comparison_prints_the_metrics_and_fails_over_a_threshold() {
 fn a_heatmap_is_written_into_a_new_folder() {
     let folder = images();
     folder.run(&["compare", "b.exr", "a.exr", "--heatmap", "new/folder/heat.png"]).assert(0, &[]);
-    let png = std::fs::read(folder.path().join("new/folder/heat.png")).unwrap();
+    let png = fs::read(folder.path().join("new/folder/heat.png")).unwrap();
     assert_eq!(&png[..4], b"\x89PNG");
 }
 
@@ -254,4 +257,47 @@ fn a_missing_loader_is_explained() {
     command.arg("devices").env("LD_LIBRARY_PATH", folder.path());
     let run = Run::of(&command.output().unwrap());
     run.assert(75, &["no Vulkan loader (libvulkan.so.1)", "help: ", "./setup"]);
+}
+
+/// Fills the driver's cache by other processes, and renders from it.
+#[test]
+fn kernels_are_compiled_in_other_processes() {
+    if !is_software() {
+        return;
+    }
+    let folder = Folder::new();
+    let cache = folder.path().join("shaders");
+    let run = |arguments: &[&str]| {
+        let mut command = program(folder.path());
+        Run::of(&command.env("MESA_SHADER_CACHE_DIR", &cache).args(arguments).output().unwrap())
+    };
+    let compile = |kernels: &str| {
+        run(&["compile", "0", kernels]).assert(0, &[]);
+        let mut folders = vec![cache.clone()];
+        let mut bytes = 0;
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
+                match entry.metadata().unwrap() {
+                    found if found.is_dir() => folders.push(entry.path()),
+                    found => bytes += found.len(),
+                }
+            }
+        }
+        bytes
+    };
+    let none = compile("[]");
+    let one = compile(r#"[["deposit", []]]"#);
+    assert!(one > none, "{one} bytes, {none} without the kernel");
+    assert_eq!(compile(r#"[["deposit", []]]"#), one);
+    run(&["compile", "0", r#"[["no_pass", []]]"#]).assert(2, &["no pass is no_pass"]);
+
+    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
+    folder.write("scene.toml", command::yard([64, 48], command::SKY, clay, command::BALL));
+    let picture = |name: &str, messages: &[&str]| {
+        run(&["render", "scene.toml", "--spp=1", "-vv", "-o", name]).assert(0, messages);
+        Image::read_exr(&folder.path().join(name)).unwrap().channels
+    };
+    // The cache lacks most kernels of the first picture, and none of the second.
+    let cold = picture("cold.exr", &["processes that compile ahead: "]);
+    assert_eq!(picture("warm.exr", &[]), cold);
 }

@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod compare;
+pub mod compile;
 pub mod completions;
 pub mod convert;
 mod denoise;
@@ -19,7 +20,7 @@ pub mod self_test;
 pub mod study;
 pub mod view;
 
-use std::io::Write;
+use std::{env, io::Write, process::Command, sync::OnceLock};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -69,6 +70,26 @@ pub(crate) fn start_threads() -> Result<Option<ThreadPool>> {
         .build()
         .map(Some)
         .map_err(|error| Error::usage(format!("cannot work with one thread: {error}")))
+}
+
+static PROGRAM: OnceLock<Vec<String>> = OnceLock::new();
+
+/// Names what runs the program, and its first arguments: this process's own, if nobody does.
+pub fn set_program(program: Vec<String>) {
+    PROGRAM.set(program).ok();
+}
+
+/// Returns a command that runs this program in a process of its own.
+///
+/// # Errors
+/// The system does not say where the program lies.
+pub(crate) fn own_program() -> std::io::Result<Command> {
+    let Some([program, arguments @ ..]) = PROGRAM.get().map(Vec::as_slice) else {
+        return env::current_exe().map(Command::new);
+    };
+    let mut command = Command::new(program);
+    command.args(arguments);
+    Ok(command)
 }
 
 /// Writes `text` and a line break to standard output. A closed pipe (`| head`) is not an error.

@@ -1,18 +1,16 @@
 //! `fenestra self-test`: the self-test of a device in a process of its own, which a driver may crash.
 
 use std::{
-    env,
     io::{Read, Write},
     path::PathBuf,
     process::{Command, ExitStatus, Stdio},
-    sync::OnceLock,
     thread,
     time::{Duration, Instant},
 };
 
 use sha2::{Digest, Sha256};
 
-use super::print_line;
+use super::{own_program, print_line};
 use crate::{
     error::Result,
     files,
@@ -45,7 +43,6 @@ pub struct Arguments {
 /// # Errors
 /// The device cannot be opened or fails, which is no wrong answer.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    #[cfg(unix)]
     forbid_core_dumps();
     // The host's tracer needs no test of the driver.
     let device = Device::open_traced(Some(&arguments.device), false, Tracer::Device)?;
@@ -55,10 +52,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// A crash of the driver is an expected answer.
-#[cfg(unix)]
-fn forbid_core_dumps() {
-    use nix::sys::resource::{Resource, setrlimit};
-    if let Err(error) = setrlimit(Resource::RLIMIT_CORE, 0, 0) {
+pub(super) fn forbid_core_dumps() {
+    #[cfg(unix)]
+    if let Err(error) =
+        nix::sys::resource::setrlimit(nix::sys::resource::Resource::RLIMIT_CORE, 0, 0)
+    {
         log::debug!("core dumps stay allowed: {error}");
     }
 }
@@ -125,23 +123,11 @@ fn record(capabilities: &Capabilities) -> Option<PathBuf> {
     Some(files::cache_folder("self-tests")?.join(name))
 }
 
-/// Names the program that runs the test, and its first arguments: this one, if nobody does.
-pub fn set_program(program: Vec<String>) {
-    PROGRAM.set(program).ok();
-}
-
-static PROGRAM: OnceLock<Vec<String>> = OnceLock::new();
-
 /// Runs the program's test of a device.
 fn test(index: usize, longest: Duration) -> Verdict {
-    let mut command = match (PROGRAM.get().map(Vec::as_slice), env::current_exe()) {
-        (Some([program, arguments @ ..]), _) => {
-            let mut command = Command::new(program);
-            command.args(arguments);
-            command
-        }
-        (_, Ok(program)) => Command::new(program),
-        (_, Err(error)) => return Verdict::NotRun(error.to_string()),
+    let mut command = match own_program() {
+        Ok(command) => command,
+        Err(error) => return Verdict::NotRun(error.to_string()),
     };
     command.args([NAME, "--device", &index.to_string()]);
     verdict(&mut command, longest)

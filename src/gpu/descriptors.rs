@@ -94,6 +94,23 @@ impl DescriptorSet {
         Ok(set)
     }
 
+    /// As [`DescriptorSet::new`], with `spare` for the buffers that are not named.
+    ///
+    /// # Errors
+    /// As [`DescriptorSet::new`].
+    pub(crate) fn filled(
+        device: &Arc<Device>,
+        table: &'static BindingTable,
+        buffers: &[(Binding, &Buffer)],
+        spare: &Buffer,
+    ) -> Result<Self> {
+        let is_free =
+            |binding: &&Binding| !buffers.iter().any(|(other, _)| other.number == binding.number);
+        let mut all = buffers.to_vec();
+        all.extend(table.bindings.iter().filter(is_free).map(|binding| (*binding, spare)));
+        Self::new(device, table, &all)
+    }
+
     /// Makes a view of `buffer` that lives as long as the set.
     fn add_view(&mut self, buffer: &Buffer, format: TexelFormat) -> Result<vk::BufferView> {
         let texel_bytes = format.bytes();

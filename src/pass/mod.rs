@@ -3,6 +3,7 @@
 //! A pass is one dispatch; the name of its `.comp` file is also its debug label and its row in the
 //! timings. [`order::wave_order`] lists the passes of a wave; a [`Technique`] adds those of a sampler.
 
+pub(crate) mod compilers;
 pub(crate) mod explanation;
 pub(crate) mod film_buffers;
 pub mod geometry;

@@ -1,12 +1,13 @@
 //! Runs waves of paths over the film: records their passes, times them, and sizes the next wave.
 
 use std::{
-    collections::{BTreeMap, btree_map::Entry},
+    collections::{BTreeMap, BTreeSet, btree_map::Entry},
     sync::Arc,
     time::Instant,
 };
 
 use super::{
+    compilers::{COMPILATION, Compilers},
     film_buffers::{BLOCK_PIXELS, FilmBuffers, padded_pixels},
     kernel::{Dispatch, Domain, Kernel, Pass},
     order::{FEATURES, PassSettings, PathLists, WaveOrder, wave_order},
@@ -137,31 +138,37 @@ impl Runner {
     pub(crate) fn warm_up(&mut self, technique: &dyn Passes) -> Result<()> {
         let others = technique.other_steps();
         let all = [technique.steps()].into_iter().chain(others.iter().map(Box::as_ref));
-        for steps in all {
-            let order = wave_order(&self.settings, steps, Wave::default(), self.settings.depth);
-            let mut order = order.all();
-            order.push(Dispatch { kernel: self.accumulation(), wave: Wave::default() });
-            for Dispatch { kernel, wave } in order {
-                let mut add_ms = |name: &str, start: Instant| {
-                    let ms = start.elapsed().as_secs_f64() * 1e3;
-                    *self.compile_ms.entry(name.to_owned()).or_default() += ms;
-                };
-                let shader = kernel.shader;
-                let Entry::Vacant(vacant) = self.passes.entry(kernel) else { continue };
-                let start = Instant::now();
-                let pass = Pass::new(&self.device, vacant.key().clone())?;
-                add_ms("pipelines", start);
-                let pass = vacant.insert(pass);
-                let start = Instant::now();
-                let mut commands = Commands::begin(&self.device)?;
-                let film = self.film.set(0);
-                let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
-                pass.record(&mut commands, &sets, &wave);
-                commands.submit_and_wait()?;
-                add_ms(shader, start);
+        let order = |steps| wave_order(&self.settings, steps, Wave::default(), self.settings.depth);
+        let mut missing: Vec<Dispatch> = all.flat_map(|steps| order(steps).all()).collect();
+        missing.push(Dispatch { kernel: self.accumulation(), wave: Wave::default() });
+        let mut found = BTreeSet::new();
+        missing.retain(|Dispatch { kernel, .. }| {
+            !self.passes.contains_key(kernel) && found.insert(kernel.clone())
+        });
+        let mut compilers = None;
+        for (number, Dispatch { kernel, wave }) in missing.iter().enumerate() {
+            let start = Instant::now();
+            let pass = Pass::new(&self.device, kernel.clone())?;
+            self.add_compile_ms("pipelines", start);
+            let start = Instant::now();
+            let mut commands = Commands::begin(&self.device)?;
+            let film = self.film.set(0);
+            let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
+            pass.record(&mut commands, &sets, wave);
+            commands.submit_and_wait()?;
+            self.add_compile_ms(kernel.shader, start);
+            self.passes.insert(kernel.clone(), pass);
+            if start.elapsed() > COMPILATION && compilers.is_none() {
+                let later = missing[number + 1..].iter().map(|dispatch| &dispatch.kernel);
+                compilers = Some(Compilers::start(&self.device, later));
             }
         }
         Ok(())
+    }
+
+    fn add_compile_ms(&mut self, name: &str, start: Instant) {
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        *self.compile_ms.entry(name.to_owned()).or_default() += ms;
     }
 
     /// Runs waves like `wave` over `pixels` pixels, starting at its first, and takes the counters

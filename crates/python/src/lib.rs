@@ -11,7 +11,7 @@ use std::{collections::HashMap, path::PathBuf};
 use bytemuck::{AnyBitPattern, NoUninit, cast_slice, pod_collect_to_vec};
 use fenestra::{
     cli::{self, Command},
-    command::{convert, render, self_test, study},
+    command::{self, convert, render, study},
     film::{Attribute, Image, RgbImage},
     scene::{
         load::{LoadOptions, arrays::Arrays},
@@ -230,7 +230,7 @@ fn main(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
 /// Names what runs the program `fenestra`, for the self-test of a device.
 #[pyfunction]
 fn set_program(program: Vec<String>) {
-    self_test::set_program(program);
+    command::set_program(program);
 }
 
 /// See `python/fenestra/__init__.py`.
