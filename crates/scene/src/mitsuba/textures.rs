@@ -40,7 +40,7 @@ impl Value {
     }
 
     /// Value of which every colour is `of` the former one; colours of vertices take it of the factor.
-    pub(super) fn mapped(self, of: impl Fn(f32) -> f32) -> Self {
+    pub(super) fn mapped(self, of: impl Fn(f32) -> f32 + Sync) -> Self {
         match self {
             Self::Color(color) => Self::Color(color.map(of)),
             Self::Vertices(color) => Self::Vertices(color.map(of)),

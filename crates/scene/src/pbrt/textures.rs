@@ -351,7 +351,7 @@ fn checkerboard(first: Vec3, second: Vec3, ([du, u], [dv, v]): Mapping) -> Textu
 }
 
 /// Makes a texture of numbers, `of` the numbers of another.
-pub(super) fn map_numbers(image: &TextureUse, of: impl Fn(f32) -> f32) -> TextureUse {
+pub(super) fn map_numbers(image: &TextureUse, of: impl Fn(f32) -> f32 + Sync) -> TextureUse {
     let has_color = image.channels == Channels::Color;
     let numbers = image.with_texels(|[red, green, blue, _]| {
         [of(if has_color { (red + green + blue) / 3.0 } else { red }); 4]

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use half::f16;
+use rayon::prelude::*;
 
 use super::{Channels, Encoding, Texels, Texture, TextureUse};
 use crate::math::colour::srgb_to_linear;
@@ -28,7 +29,7 @@ impl Texture {
     /// Linear colour and opacity of every texel; 8 and 16 bits are in `encoding`.
     pub fn linear_texels(&self, encoding: Encoding) -> Vec<[f32; 4]> {
         let count = self.width as usize * self.height as usize;
-        (0..count).map(|index| self.linear_texel(encoding, index)).collect()
+        (0..count).into_par_iter().map(|index| self.linear_texel(encoding, index)).collect()
     }
 }
 
@@ -51,19 +52,19 @@ impl TextureUse {
     /// Values of every texel as a property reads them, by channel, and opacity.
     pub fn values(&self) -> Vec<[f32; 4]> {
         let texels = self.texture.linear_texels(self.encoding);
-        texels.into_iter().map(|texel| self.read(texel)).collect()
+        texels.into_par_iter().map(|texel| self.read(texel)).collect()
     }
 
     /// Makes a texture whose texels are `of` those of this one, by channel; opacity stays. Between
     /// texels it interpolates the new values.
-    pub fn mapped(&self, of: impl Fn(f32) -> f32) -> Self {
+    pub fn mapped(&self, of: impl Fn(f32) -> f32 + Sync) -> Self {
         self.with_texels(|[r, g, b, a]| [of(r), of(g), of(b), a])
     }
 
     /// As [`TextureUse::mapped`], with all channels and the opacity made of all.
-    pub(crate) fn with_texels(&self, of: impl Fn([f32; 4]) -> [f32; 4]) -> Self {
+    pub(crate) fn with_texels(&self, of: impl Fn([f32; 4]) -> [f32; 4] + Sync) -> Self {
         let texel = |value: [f32; 4]| of(value).map(f16::from_f32);
-        let texels = Texels::Halves(self.values().into_iter().map(texel).collect());
+        let texels = Texels::Halves(self.values().into_par_iter().map(texel).collect());
         Self {
             texture: Arc::new(Texture { texels, ..Texture::clone(&self.texture) }),
             channels: Channels::Color,
