@@ -66,7 +66,7 @@ impl Buffer {
     ) -> Result<Self> {
         let size = size.max(16).next_multiple_of(4);
         let asker = || format!("buffer {name} on {}", device.capabilities().name);
-        if device.capabilities().kind == "software" {
+        if device.capabilities().is_software() {
             memory::check(asker(), size).map_err(Error::memory)?;
         }
         let info = vk::BufferCreateInfo::default()

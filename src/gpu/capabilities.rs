@@ -94,13 +94,14 @@ impl Capabilities {
         missing
     }
 
+    /// True if the device is a program on the host's processor, whose memory it shares.
+    pub fn is_software(&self) -> bool {
+        self.kind == "software"
+    }
+
     /// Memory that buffers may take: of a software device no more than the process may use.
     pub(crate) fn memory_for_buffers(&self) -> u64 {
-        if self.kind == "software" {
-            self.device_memory.min(memory::room())
-        } else {
-            self.device_memory
-        }
+        if self.is_software() { self.device_memory.min(memory::room()) } else { self.device_memory }
     }
 
     /// Rank by which devices are chosen; the smallest wins.

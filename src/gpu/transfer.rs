@@ -1,18 +1,24 @@
 //! Copies between host and device: uploads and downloads of [`Buffer`]s.
 
-use std::sync::{Arc, atomic::Ordering};
+use std::sync::{
+    Arc,
+    atomic::{AtomicU32, Ordering},
+};
 
 use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
+use rayon::prelude::*;
 
 use super::{buffer::Buffer, commands::Commands, device::Device};
 use crate::error::Result;
 
 /// Maximum size of one staging copy between host and device, bytes.
 const STAGING_BYTES: usize = 16 << 20;
-/// Size of one copy out of memory that host and device share, bytes: it stays in the processor's cache.
-const WORDS_BYTES: usize = 1 << 16;
+/// Size of one copy out of memory that host and device share, bytes: it stays in the processors' caches.
+const SHARED_BYTES: usize = 1 << 20;
+/// Words that one thread copies at a time.
+const WORDS_TOGETHER: usize = 1 << 14;
 
 impl Buffer {
     /// Creates a buffer that holds `data` and is read only as a uniform texel buffer, so the limit
@@ -74,6 +80,10 @@ impl Buffer {
         if bytes.is_empty() {
             return Ok(());
         }
+        if self.device.capabilities().is_software() {
+            store(bytes, self.words()?);
+            return Ok(());
+        }
         let mut staging = Self::with_location(
             &self.device,
             "staging (upload)",
@@ -126,14 +136,11 @@ impl Buffer {
         if bytes == 0 {
             return Ok(());
         }
-        if self.device.capabilities().kind == "software" && size_of::<T>().is_multiple_of(4) {
-            let mut piece = vec![T::zeroed(); length.min((WORDS_BYTES / size_of::<T>()).max(1))];
+        if self.device.capabilities().is_software() && size_of::<T>().is_multiple_of(4) {
+            let mut piece = vec![T::zeroed(); length.min((SHARED_BYTES / size_of::<T>()).max(1))];
             let words = &self.words()?[..bytes / 4];
             for words in words.chunks(size_of_val(&piece[..]) / 4) {
-                let copies = &mut bytemuck::cast_slice_mut::<T, u32>(&mut piece)[..words.len()];
-                for (copy, word) in copies.iter_mut().zip(words) {
-                    *copy = word.load(Ordering::Relaxed);
-                }
+                load(words, &mut bytemuck::cast_slice_mut(&mut piece)[..words.len()]);
                 take(&piece[..size_of_val(words) / size_of::<T>()]);
             }
             return Ok(());
@@ -157,4 +164,29 @@ impl Buffer {
         }
         Ok(())
     }
+}
+
+/// Copies words out of memory that host and device share.
+fn load(words: &[AtomicU32], copies: &mut [u32]) {
+    let pieces = copies.par_chunks_mut(WORDS_TOGETHER).zip(words.par_chunks(WORDS_TOGETHER));
+    pieces.for_each(|(copies, words)| {
+        for (copy, word) in copies.iter_mut().zip(words) {
+            *copy = word.load(Ordering::Relaxed);
+        }
+    });
+}
+
+/// Copies bytes into such memory, with zeros up to a whole word.
+fn store(bytes: &[u8], words: &[AtomicU32]) {
+    let pieces = bytes.par_chunks(4 * WORDS_TOGETHER).zip(words.par_chunks(WORDS_TOGETHER));
+    pieces.for_each(|(bytes, words)| {
+        let whole = bytes.chunks_exact(4);
+        let rest = whole.remainder();
+        let mut last = [0; 4];
+        last[..rest.len()].copy_from_slice(rest);
+        let last = (!rest.is_empty()).then_some(&last[..]);
+        for (bytes, word) in whole.chain(last).zip(words) {
+            word.store(bytemuck::pod_read_unaligned(bytes), Ordering::Relaxed);
+        }
+    });
 }

@@ -47,7 +47,7 @@ impl Compilers {
         kernels: impl DoubleEndedIterator<Item = &'a Kernel>,
     ) -> Self {
         let capabilities = device.capabilities();
-        let Some(program) = PROGRAM.get().filter(|_| capabilities.kind == "software") else {
+        let Some(program) = PROGRAM.get().filter(|_| capabilities.is_software()) else {
             return Self(Vec::new());
         };
         let last_first: Vec<&Kernel> = kernels.rev().collect();

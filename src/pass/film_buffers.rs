@@ -95,7 +95,7 @@ pub(crate) fn check_memory(
     let pairs = (aovs & (AOV_VISIBLE | AOV_CACHE_ENTRIES)).count_ones()
         + coverages * size_of::<Coverage>() as u32 / 8;
     // Four sums and the image, in three channels each, and the radiance of a sweep.
-    let copies = if device.capabilities().kind == "software" { 2 } else { 1 };
+    let copies = if device.capabilities().is_software() { 2 } else { 1 };
     let pixel_bytes = u64::from(copies * (48 + 12 * triples + 8 * pairs + 24 * light_groups))
         + u64::from(12 * (2 + triples + pairs + 2 * light_groups));
     let Window { width, height, .. } = window;

@@ -211,7 +211,7 @@ impl Schedule {
 
     /// For incoherent rays. Software devices gain by refilling lanes (`docs/traversal.md`).
     pub(crate) fn incoherent(capabilities: &Capabilities) -> Self {
-        if capabilities.kind == "software" {
+        if capabilities.is_software() {
             Self { rays_per_invocation: 16, refill_lanes: capabilities.subgroup_size.div_ceil(3) }
         } else {
             Self::SINGLE

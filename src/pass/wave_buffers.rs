@@ -22,7 +22,7 @@ const FIRST_PATHS: u32 = 1 << 14;
 
 /// Returns the most paths in flight on a device.
 pub(crate) fn most_paths(capabilities: &Capabilities) -> u32 {
-    if capabilities.kind == "software" { SOFTWARE_PATHS } else { GPU_PATHS }
+    if capabilities.is_software() { SOFTWARE_PATHS } else { GPU_PATHS }
 }
 
 /// Returns the bytes of the lists of living paths in a wave of `paths` paths.

@@ -97,7 +97,7 @@ pub fn device() -> &'static Arc<Device> {
 
 /// True if the test's device is software: it rounds as the host does, and shares its memory and cores.
 pub fn is_software() -> bool {
-    device().capabilities().kind == "software"
+    device().capabilities().is_software()
 }
 
 /// Makes a renderer of `scene` on the test's device.

@@ -170,7 +170,7 @@ impl Arms {
         settings: &PassSettings,
         capabilities: &Capabilities,
     ) -> Result<Self> {
-        let is_software = capabilities.kind == "software";
+        let is_software = capabilities.is_software();
         let own = parameters.guided;
         let candidates = first_candidates(parameters)?;
         let (most, has_paths) = (settings.shadow_rays, settings.depth > 1);

@@ -125,7 +125,7 @@ pub(super) struct Parts {
 
 impl Worker {
     pub(crate) fn new(parts: Parts) -> Self {
-        let is_software = parts.device.capabilities().kind == "software";
+        let is_software = parts.device.capabilities().is_software();
         let seed = parts.settings.seed;
         let mut worker = Self {
             rig: Rig::new(parts.scene.camera),
