@@ -2,7 +2,7 @@
 
 use std::{
     ffi::CStr,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard},
 };
 
 use ash::{ext, khr, vk};
@@ -40,7 +40,7 @@ pub enum Tracer {
 pub struct Device {
     pub(super) raw: ash::Device,
     pub(super) debug_names: Option<ext::debug_utils::Device>,
-    queue: Mutex<vk::Queue>,
+    queue: RwLock<vk::Queue>,
     capabilities: Capabilities,
     pub(super) physical: vk::PhysicalDevice,
     tracer: Tracer,
@@ -169,7 +169,7 @@ impl Device {
         Ok(Arc::new(Self {
             raw,
             debug_names,
-            queue: Mutex::new(queue),
+            queue: RwLock::new(queue),
             capabilities,
             physical,
             tracer,
@@ -236,11 +236,16 @@ impl Device {
         self.pipeline_cache.save(&self.raw, &self.capabilities);
     }
 
-    /// Locks the queue for one thread. Pipelines are created under the same lock:
-    /// software drivers compile a pipeline on the queue's own thread when a dispatch first uses it,
-    /// and Mesa 22.3 was seen to crash there when tests ran in several threads.
-    pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Locks the queue for one thread.
+    pub(super) fn queue(&self) -> RwLockWriteGuard<'_, vk::Queue> {
+        self.queue.write().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Keeps the queue idle while pipelines are made: software drivers compile a pipeline on the queue's own
+    /// thread when a dispatch first uses it, and Mesa 22.3 was seen to crash there when tests ran in several
+    /// threads.
+    pub(super) fn idle_queue(&self) -> RwLockReadGuard<'_, vk::Queue> {
+        self.queue.read().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn queue_family(&self) -> u32 {

@@ -108,7 +108,7 @@ fn compile(
         .name(c"main")
         .specialization_info(&specialization);
     let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
-    let queue = device.queue();
+    let queue = device.idle_queue();
     // SAFETY: module, layout and cache are alive; the module is not needed afterwards.
     let result = unsafe {
         let result = raw_device.create_compute_pipelines(device.pipeline_cache(), &info, None);

@@ -1,8 +1,8 @@
 //! The compute pipelines of a device, made once each.
 
 use std::{
-    collections::{HashMap, hash_map::Entry},
-    sync::{Mutex, PoisonError},
+    collections::HashMap,
+    sync::{Arc, Mutex, PoisonError},
 };
 
 use ash::vk;
@@ -14,8 +14,11 @@ use crate::error::Result;
 /// as in a window or a study, do not translate the same shaders again.
 #[derive(Default)]
 pub(super) struct Pipelines {
-    made: Mutex<HashMap<Key, Made>>,
+    places: Mutex<HashMap<Key, Place>>,
 }
+
+/// Place of a pipeline, locked while a thread makes it: others make other pipelines meanwhile.
+type Place = Arc<Mutex<Option<Made>>>;
 
 /// Name, SHA-256 of the SPIR-V and constants that a pipeline is made from.
 type Key = (String, [u8; 32], Vec<(u32, u32)>);
@@ -36,17 +39,23 @@ impl Pipelines {
         make: impl FnOnce() -> Result<Made>,
     ) -> Result<Made> {
         let key = (name.to_owned(), Sha256::digest(spirv).into(), constants.to_vec());
-        match self.made.lock().unwrap_or_else(PoisonError::into_inner).entry(key) {
-            Entry::Occupied(made) => Ok(*made.get()),
-            Entry::Vacant(place) => Ok(*place.insert(make()?)),
+        let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = Arc::clone(places.entry(key).or_default());
+        drop(places);
+        let mut place = place.lock().unwrap_or_else(PoisonError::into_inner);
+        match *place {
+            Some(made) => Ok(made),
+            None => make().inspect(|made| *place = Some(*made)),
         }
     }
 
     /// # Safety
     /// The device must be alive and idle, and nothing may use its pipelines any more.
     pub(crate) unsafe fn destroy(&self, device: &ash::Device) {
-        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        for (_, made) in made.drain() {
+        let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
+        for (_, place) in places.drain() {
+            let place = place.lock().unwrap_or_else(PoisonError::into_inner);
+            let Some(made) = *place else { continue };
             // SAFETY: promised by the caller.
             unsafe {
                 device.destroy_pipeline(made.raw, None);

@@ -6,6 +6,8 @@ use std::{
     time::Instant,
 };
 
+use rayon::prelude::*;
+
 use super::{
     compilers::{COMPILATION, Compilers},
     film_buffers::{BLOCK_PIXELS, FilmBuffers, padded_pixels},
@@ -145,11 +147,12 @@ impl Runner {
         missing.retain(|Dispatch { kernel, .. }| {
             !self.passes.contains_key(kernel) && found.insert(kernel.clone())
         });
+        let start = Instant::now();
+        let pass = |dispatch: &Dispatch| Pass::new(&self.device, dispatch.kernel.clone());
+        let passes = missing.par_iter().with_max_len(1).map(pass).collect::<Result<Vec<_>>>()?;
+        self.add_compile_ms("pipelines", start);
         let mut compilers = None;
-        for (number, Dispatch { kernel, wave }) in missing.iter().enumerate() {
-            let start = Instant::now();
-            let pass = Pass::new(&self.device, kernel.clone())?;
-            self.add_compile_ms("pipelines", start);
+        for (number, (Dispatch { kernel, wave }, pass)) in missing.iter().zip(passes).enumerate() {
             let start = Instant::now();
             let mut commands = Commands::begin(&self.device)?;
             let film = self.film.set(0);
