@@ -76,7 +76,9 @@ fn surfaces_are_shown_in_mirrors_and_through_glass() {
         MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: Vec3::ONE };
     let (smooth, rough) = (MaterialKind::glass(1.5, 0.0), MaterialKind::glass(1.5, 0.3));
     let seen = Vec3::new(0.6, 0.0, 0.3);
+    let black = MaterialKind::Mirror { reflectance: Vec3::ZERO };
     for (kind, depth, albedo, normal) in [
+        (black, 2, Vec3::ZERO, 0.999..=1.0),
         (mirror, 1, 0.5 * seen, -1.0..=-0.999),
         (pane, 4, seen, 0.6..=0.95),
         (smooth, 6, seen, 0.6..=0.95),

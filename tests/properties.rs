@@ -8,7 +8,12 @@
 
 use std::{env, fs};
 
-use fenestra::{film::Sums, sampler::Sampler, scene::Scene, session::Settings};
+use fenestra::{
+    film::{Aov, Sums},
+    sampler::Sampler,
+    scene::Scene,
+    session::Settings,
+};
 use glam::Vec3;
 use tempfile::TempDir;
 
@@ -214,11 +219,16 @@ fn samples_that_are_not_finite_are_counted() {
     scene.environment = scenes::environment(16, |direction| {
         Vec3::splat(if direction.z > 0.0 { f32::INFINITY } else { 1.0 })
     });
-    let settings = Settings { sampler: Sampler::Cosine, depth: 1, ..Settings::default() };
+    let aovs = vec![Aov::LightGroups];
+    let settings = Settings { sampler: Sampler::Cosine, depth: 1, aovs, ..Settings::default() };
     let mut renderer = support::renderer(&scene, settings);
     renderer.render_pass(2).unwrap();
     let sums = renderer.sums().unwrap();
     assert_eq!(sums.non_finite_count(), 0);
+    for pixel in 0..sums.pixel_count() {
+        let means: Vec<_> = sums.groups.iter().map(|own| sums.group_mean(own, pixel)).collect();
+        assert!(means.as_flattened().iter().all(|mean| mean.is_finite()), "{pixel}: {means:?}");
+    }
     let dark = (0..sums.pixel_count()).filter(|pixel| sums.mean(*pixel) == [0.0; 3]).count();
     let dropped = renderer.totals().dropped_samples;
     assert!(dropped >= 2 * dark as u64 && dark > 50, "{dropped} of {dark} pixels");
