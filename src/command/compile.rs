@@ -20,7 +20,7 @@ pub struct Arguments {
 }
 
 /// Lets renders start `compile` where it saves time.
-pub(crate) fn allow() {
+pub fn allow() {
     compilers::set_program(|| {
         let mut command = own_program()?;
         command.arg(NAME);

@@ -190,3 +190,21 @@ fn store(bytes: &[u8], words: &[AtomicU32]) {
         }
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_hold_all_bytes_and_end_with_zeros() {
+        let count = WORDS_TOGETHER + 3;
+        let words: Vec<AtomicU32> = (0..=count).map(|_| AtomicU32::new(u32::MAX)).collect();
+        let mut bytes: Vec<u8> = (0..4 * count).map(|place| (place % 251) as u8).collect();
+        store(&bytes[..4 * count - 1], &words);
+        let mut found = vec![0; count + 1];
+        load(&words, &mut found);
+        bytes[4 * count - 1] = 0;
+        assert_eq!(bytemuck::cast_slice::<u32, u8>(&found[..count]), bytes);
+        assert_eq!(found[count], u32::MAX);
+    }
+}

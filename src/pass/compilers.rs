@@ -30,8 +30,8 @@ const MOST_PROCESSES: usize = 3;
 
 static PROGRAM: OnceLock<fn() -> IoResult<Command>> = OnceLock::new();
 
-/// Lets this process start others, by a command to which the index of the device is added. They call
-/// [`compile`] on their standard input.
+/// Lets this process start others, by a command that is given the index of the device and what [`compile`]
+/// reads.
 pub(crate) fn set_program(program: fn() -> IoResult<Command>) {
     PROGRAM.set(program).ok();
 }
@@ -50,7 +50,8 @@ impl Compilers {
         let Some(program) = PROGRAM.get().filter(|_| capabilities.is_software()) else {
             return Self(Vec::new());
         };
-        let last_first: Vec<&Kernel> = kernels.rev().collect();
+        let last_first: Vec<&Kernel> =
+            kernels.rev().filter(|kernel| kernel.is_dispatched()).collect();
         let free = available_parallelism().map_or(0, |cores| cores.get() - 1);
         let count = free.min(MOST_PROCESSES).min(last_first.len() / LEAST_KERNELS);
         let children = lists(&last_first, count).into_iter().map(|list| {

@@ -65,6 +65,11 @@ impl Kernel {
         self
     }
 
+    /// True unless the host does all.
+    pub(super) fn is_dispatched(&self) -> bool {
+        self.question != Some(Question::Visible)
+    }
+
     /// Number of invocations for a wave; at least one, so that an empty wave makes drivers compile.
     pub fn invocations(&self, wave: &Wave) -> u32 {
         let elements = match self.domain {
@@ -101,7 +106,8 @@ impl Pass {
     /// Compiles `kernel`; [`crate::Error::Vulkan`] if the driver refuses it.
     pub fn new(device: &Arc<Device>, kernel: Kernel) -> Result<Self> {
         let spirv = spirv::pass(kernel.shader);
-        let pipeline = (kernel.question != Some(Question::Visible))
+        let pipeline = kernel
+            .is_dispatched()
             .then(|| Pipeline::new(device, kernel.shader, spirv, &kernel.constants))
             .transpose()?;
         Ok(Self { kernel, pipeline })

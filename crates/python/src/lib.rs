@@ -11,7 +11,7 @@ use std::{collections::HashMap, path::PathBuf};
 use bytemuck::{AnyBitPattern, NoUninit, cast_slice, pod_collect_to_vec};
 use fenestra::{
     cli::{self, Command},
-    command::{self, convert, render, study},
+    command::{self, compile, convert, render, study},
     film::{Attribute, Image, RgbImage},
     scene::{
         load::{LoadOptions, arrays::Arrays},
@@ -227,10 +227,11 @@ fn main(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
     py.detach(|| cli::run(arguments))
 }
 
-/// Names what runs the program `fenestra`, for the self-test of a device.
+/// Names what runs the program `fenestra`, for the self-test of a device and to compile kernels ahead.
 #[pyfunction]
 fn set_program(program: Vec<String>) {
     command::set_program(program);
+    compile::allow();
 }
 
 /// See `python/fenestra/__init__.py`.
