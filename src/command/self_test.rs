@@ -54,10 +54,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// A crash of the driver is an expected answer.
 pub(super) fn forbid_core_dumps() {
     #[cfg(unix)]
-    if let Err(error) =
-        nix::sys::resource::setrlimit(nix::sys::resource::Resource::RLIMIT_CORE, 0, 0)
     {
-        log::debug!("core dumps stay allowed: {error}");
+        use nix::sys::resource::{Resource, setrlimit};
+        if let Err(error) = setrlimit(Resource::RLIMIT_CORE, 0, 0) {
+            log::debug!("core dumps stay allowed: {error}");
+        }
     }
 }
 
