@@ -23,10 +23,7 @@ pub mod source;
 pub mod statistics;
 pub mod x11;
 
-use std::{
-    cell::Cell,
-    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError},
-};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
@@ -42,28 +39,11 @@ use fenestra::{
     },
 };
 
-/// Devices of which each has one test at a time.
-static DEVICES: [OnceLock<Arc<Device>>; 2] = [const { OnceLock::new() }; 2];
-static IN_USE: [Mutex<()>; DEVICES.len()] = [const { Mutex::new(()) }; DEVICES.len()];
-
-thread_local! {
-    /// Index in [`DEVICES`] of the one that the test of this thread uses.
-    static DEVICE: Cell<usize> = const { Cell::new(0) };
-}
-
-/// Gives the calling test a device to itself: the validation layers were seen to crash when several
-/// threads made and dropped renderers of one device at once.
+/// Gives the calling test the device to itself: the validation layers 1.3.239 crash at times where several
+/// threads make and drop renderers, of one device or of two.
 pub fn alone() -> MutexGuard<'static, ()> {
-    let free = |number: usize| match IN_USE[number].try_lock() {
-        Ok(guard) => Some((number, guard)),
-        Err(TryLockError::Poisoned(guard)) => Some((number, guard.into_inner())),
-        Err(TryLockError::WouldBlock) => None,
-    };
-    let (number, guard) = (0..DEVICES.len())
-        .find_map(free)
-        .unwrap_or_else(|| (0, IN_USE[0].lock().unwrap_or_else(PoisonError::into_inner)));
-    DEVICE.set(number);
-    guard
+    static IN_USE: Mutex<()> = Mutex::new(());
+    IN_USE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Input of the probe `product_state` for one path: a surface seen along a direction, and a shadow
@@ -78,13 +58,13 @@ pub struct PathInput {
     pub is_visible: u32,
 }
 
-/// Returns the device of the calling test, the first one unless it is [`alone`], with validation and
-/// synchronization validation on.
+/// Returns the device of the tests, with validation and synchronization validation on.
 ///
 /// # Panics
 /// Without a Vulkan device or the validation layers: run `./setup`.
 pub fn device() -> &'static Arc<Device> {
-    DEVICES[DEVICE.get()].get_or_init(|| match Device::open(None, true) {
+    static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
+    DEVICE.get_or_init(|| match Device::open(None, true) {
         Ok(device) => {
             eprintln!("device: {} ({})", device.capabilities().name, device.capabilities().driver);
             device
