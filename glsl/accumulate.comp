@@ -31,20 +31,17 @@ vec3 filtered(PathIndex index, uint place, uint i, uint layer) {
     if (parameters.film_filter != FILTER_GAUSSIAN) {
         return film_radiance[radiance_place(place, i) + layer];
     }
-    uvec2 last = uvec2(parameters.crop_width, parameters.crop_height) - 1u;
-    vec2 before = vec2(greaterThan(index.crop_pixel, uvec2(0u)));
-    vec2 after = vec2(lessThan(index.crop_pixel, last));
+    uvec2 end = uvec2(parameters.crop_width, parameters.crop_height) - 1u;
+    uvec2 first = uvec2(equal(index.crop_pixel, uvec2(0u)));
+    uvec2 last = 1u + uvec2(lessThan(index.crop_pixel, end));
     vec2 offset = sample_offset(index.pixel, wave.first_sample + i, wave.seed);
-    vec3 columns = filter_weights(offset.x, vec3(before.x, 1.0, after.x));
-    vec3 rows = filter_weights(offset.y, vec3(before.y, 1.0, after.y));
+    vec3 columns = filter_weights(offset.x, vec3(1u - first.x, 1u, last.x - 1u));
+    vec3 rows = filter_weights(offset.y, vec3(1u - first.y, 1u, last.y - 1u));
     vec3 value = vec3(0.0);
-    for (uint y = 0u; y < 3u; ++y) {
-        for (uint x = 0u; x < 3u; ++x) {
-            float weight = rows[y] * columns[x];
-            if (weight > 0.0) {
-                uint beside = place + y * parameters.crop_width + x - parameters.crop_width - 1u;
-                value += weight * film_radiance[radiance_place(beside, i) + layer];
-            }
+    for (uint y = first.y; y <= last.y; ++y) {
+        for (uint x = first.x; x <= last.x; ++x) {
+            uint beside = place + y * parameters.crop_width + x - parameters.crop_width - 1u;
+            value += rows[y] * columns[x] * film_radiance[radiance_place(beside, i) + layer];
         }
     }
     return value;

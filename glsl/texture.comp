@@ -27,12 +27,27 @@ void read_textures(uint path) {
     Attributes attributes = triangle_attributes(
         hit.triangle, barycentric(hit.triangle, instance, ray.origin, ray.direction));
 
-    vec3 color = texture_value(surface.color, attributes.uv0, attributes.uv1).rgb;
+    // A loop, since drivers copy a lookup into each place that calls it.
+    vec3 color = vec3(1.0);
+    vec3 normal = vec3(0.0);
+    float roughness = 1.0;
+    float metallic = 1.0;
+    uint count = surface.normal != NO_TEXTURE ? 4u : 3u;
+    for (uint property = 0u; property < count; property++) {
+        uint use_index = property == 0u ? surface.color
+            : property == 1u            ? surface.roughness
+            : property == 2u            ? surface.metallic
+                                        : surface.normal;
+        vec3 value = texture_value(use_index, attributes.uv0, attributes.uv1).rgb;
+        float number = dot(value, LUMINANCE_WEIGHTS);
+        color = property == 0u ? value : color;
+        roughness = property == 1u ? number : roughness;
+        metallic = property == 2u ? number : metallic;
+        normal = value;
+    }
     if ((surface.flags & SURFACE_VERTEX_COLOR) != 0u) {
         color *= attributes.color.rgb;
     }
-    float roughness = texture_number(surface.roughness, attributes.uv0, attributes.uv1);
-    float metallic = texture_number(surface.metallic, attributes.uv0, attributes.uv1);
     hit_surfaces[path] = Surface(
         clamp(material.reflectance * color, 0.0, 1.0),
         clamp(material.alpha * roughness * roughness, min(material.alpha, SMALLEST_ALPHA), 1.0),
@@ -41,7 +56,7 @@ void read_textures(uint path) {
     if (surface.normal != NO_TEXTURE) {
         float side = is_back(hit.triangle, instance, ray.direction) ? -1.0 : 1.0;
         vec3 mapped = mapped_normal(
-            surface.normal, surface.normal_scale, hit.triangle, instance, attributes,
+            surface.normal, normal, surface.normal_scale, hit.triangle, instance, attributes,
             hit.shading_normal, side);
         hits[path].shading_normal =
             visible_normal(mapped, hit.geometric_normal, ray.direction);

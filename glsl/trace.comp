@@ -68,14 +68,12 @@ void start_ray(uint path) {
     bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
 }
 
-void main() {
-    uint ray_count = listed_path_count();
-    uint first = gl_WorkGroupID.x * WORKGROUP_SIZE * RAYS_PER_INVOCATION + gl_LocalInvocationID.x;
-
+// Follows the rays of an invocation, the first one of `ray_count` and each WORKGROUP_SIZE further on.
+void follow_rays(uint first, uint ray_count) {
     uint turn = 0u;
     uint steps = 0u;
     uint given_up = 0u;
-    bool has_ray = ANSWERED == 0u && first < ray_count;
+    bool has_ray = first < ray_count;
     if (has_ray) {
         start_ray(listed_path(first + turn * WORKGROUP_SIZE));
     }
@@ -114,7 +112,15 @@ void main() {
         uint lost = uint(findLSB(given_up));
         COUNT_GIVEN_UP(listed_path(first + lost * WORKGROUP_SIZE));
     }
-    for (turn = 0u; turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count; turn++) {
+}
+
+void main() {
+    uint ray_count = listed_path_count();
+    uint first = gl_WorkGroupID.x * WORKGROUP_SIZE * RAYS_PER_INVOCATION + gl_LocalInvocationID.x;
+    if (ANSWERED == 0u) {
+        follow_rays(first, ray_count);
+    }
+    for (uint turn = 0u; turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count; turn++) {
         uint path = listed_path(first + turn * WORKGROUP_SIZE);
         Ray ray = load_ray(path);
         uint triangle = hits[path].triangle;

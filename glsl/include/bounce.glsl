@@ -67,36 +67,35 @@ bool follow_bounce(
     return alive;
 }
 
-// Sends a path on from a specular surface, or ends it where no light was sampled for another
-// reason. Returns true if it goes on.
-bool follow_specular(uint path, PathIndex index, Hit hit, uint number, uint seed) {
-    Material material;
-    bool goes_on = HAS_SPECULAR && hit.triangle != NO_TRIANGLE;
-    if (goes_on) {
-        material = load_surface(path, triangle_material(hit.triangle, load_hit_instance(path)));
-        goes_on = is_specular(material.kind);
-    }
-    if (!goes_on) {
-        rays[path].is_active = 0u;
+// Loads the material from which a path goes on: that of light sampling, or else a specular one. Returns
+// false where the path ends.
+bool goes_on_from(uint path, Hit hit, out Material material) {
+    bool samples_light = hit.material != NO_MATERIAL;
+    if (!samples_light && (!HAS_SPECULAR || hit.triangle == NO_TRIANGLE)) {
         return false;
     }
-    vec3 outgoing = -rays[path].direction;
-    Frame frame = frame_from_normal(hit.shading_normal);
-    vec3 u = bounce_numbers(index, number, seed);
-    vec3 outgoing_local = to_local(frame, outgoing);
+    material = load_surface(
+        path, samples_light ? hit.material
+                            : triangle_material(hit.triangle, load_hit_instance(path)));
+    return samples_light || is_specular(material.kind);
+}
+
+// Returns what bounce_factor returns for a direction drawn at a specular surface, and that direction.
+vec3 specular_factor(
+    uint path, Hit hit, Material material, Frame frame, vec3 outgoing_local, vec3 u,
+    out vec3 direction) {
     Scatter scattered;
     if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
         // trace.comp has let the rest through, and weighed the path by what a pane reflects.
         scattered =
             Scatter(vec3(-outgoing_local.xy, outgoing_local.z), vec3(1.0), false);
     } else {
-        bool is_behind = is_back(hit.triangle, load_hit_instance(path), -outgoing);
+        bool is_behind = is_back(hit.triangle, load_hit_instance(path), rays[path].direction);
         scattered = scatter(material, outgoing_local, is_behind, u);
         scattered.weight *= inside_transmittance(material, is_behind, hit.distance);
     }
-    vec3 direction = to_world(frame, scattered.direction_local);
+    direction = to_world(frame, scattered.direction_local);
     bool is_behind = dot(direction, hit.geometric_normal) < 0.0;
     // A shading normal may send light through an opaque surface, or reflect it from a clear one.
-    vec3 factor = is_behind == scattered.is_transmitted ? scattered.weight : vec3(0.0);
-    return follow_bounce(path, index, hit, direction, 0.0, factor, number, seed);
+    return is_behind == scattered.is_transmitted ? scattered.weight : vec3(0.0);
 }

@@ -131,19 +131,18 @@ vec4 texture_lookup(TextureUse used, vec2 image) {
     bool is_nearest = (used.flags & TEXTURE_NEAREST) != 0u;
     place -= is_nearest ? 0.0 : 0.5;
     ivec2 low = ivec2(floor(place));
-    int left = wrapped_texel(low.x, wrap_u, used.width);
-    int top = wrapped_texel(low.y, wrap_v, used.height);
-    vec4 upper_left = texture_texel(used, ivec2(left, top));
-    if (is_nearest) {
-        return upper_left;
+    vec2 share = is_nearest ? vec2(0.0) : place - floor(place);
+    // A loop that no compiler unrolls, since it would copy the decoding of a texel into every place.
+    uint corners = is_nearest ? 1u : 4u;
+    vec4 sum = vec4(0.0);
+    for (uint corner = 0u; corner < corners; corner++) {
+        ivec2 step = ivec2(corner & 1u, corner >> 1u);
+        vec2 weight = mix(1.0 - share, share, vec2(step));
+        int column = wrapped_texel(low.x + step.x, wrap_u, used.width);
+        int row = wrapped_texel(low.y + step.y, wrap_v, used.height);
+        sum += weight.x * weight.y * texture_texel(used, ivec2(column, row));
     }
-    int right = wrapped_texel(low.x + 1, wrap_u, used.width);
-    int bottom = wrapped_texel(low.y + 1, wrap_v, used.height);
-    vec2 share = place - floor(place);
-    vec4 upper = mix(upper_left, texture_texel(used, ivec2(right, top)), share.x);
-    vec4 lower = mix(
-        texture_texel(used, ivec2(left, bottom)), texture_texel(used, ivec2(right, bottom)), share.x);
-    return mix(upper, lower, share.y);
+    return sum;
 }
 
 // Image coordinates of a point of the surface.
@@ -291,19 +290,19 @@ vec4 surface_tangent(
     return gradient_tangent(b - a, c - a, image[1] - image[0], image[2] - image[0], normal);
 }
 
-// Unit shading normal after a normal map. `shading_normal` and the result are on the same side of
-// the surface: the front for a `side` of 1, the back for -1, where the map's normals are turned
+// Unit shading normal after a normal map of this value. `shading_normal` and the result are on the same
+// side of the surface: the front for a `side` of 1, the back for -1, where the map's normals are turned
 // round. The caller still has to turn the result toward the viewer with consistent_normal.
 vec3 mapped_normal(
-    uint use_index, float normal_scale, uint triangle, uint instance, Attributes attributes,
-    vec3 shading_normal, float side
+    uint use_index, vec3 value, float normal_scale, uint triangle, uint instance,
+    Attributes attributes, vec3 shading_normal, float side
 ) {
     vec3 normal = side * shading_normal;
     vec4 tangent = surface_tangent(use_index, triangle, instance, attributes, normal);
     if (tangent.w == 0.0) {
         return shading_normal;
     }
-    vec3 local = 2.0 * texture_value(use_index, attributes.uv0, attributes.uv1).rgb - 1.0;
+    vec3 local = 2.0 * value - 1.0;
     vec3 bitangent = tangent.w * cross(normal, tangent.xyz);
     vec3 mapped = normal_scale * local.x * tangent.xyz + normal_scale * local.y * bitangent
         + local.z * normal;

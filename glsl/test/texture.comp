@@ -32,8 +32,9 @@ TextureAnswer answer(TextureQuery query) {
     MaterialSurface surface = load_material_surface(query.material);
     TextureUse used = load_texture_use(query.use_index);
     Attributes attributes = triangle_attributes(query.triangle, query.weights);
+    vec3 value = texture_value(query.use_index, attributes.uv0, attributes.uv1).rgb;
     vec3 mapped = mapped_normal(
-        query.use_index, surface.normal_scale, query.triangle, NO_INSTANCE, attributes,
+        query.use_index, value, surface.normal_scale, query.triangle, NO_INSTANCE, attributes,
         query.shading_normal, query.side);
     return TextureAnswer(
         texture_value(query.use_index, query.uv0, query.uv1),
