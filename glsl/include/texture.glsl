@@ -131,16 +131,20 @@ vec4 texture_lookup(TextureUse used, vec2 image) {
     bool is_nearest = (used.flags & TEXTURE_NEAREST) != 0u;
     place -= is_nearest ? 0.0 : 0.5;
     ivec2 low = ivec2(floor(place));
-    vec2 share = is_nearest ? vec2(0.0) : place - floor(place);
-    // A loop that no compiler unrolls, since it would copy the decoding of a texel into every place.
+    vec2 share = place - floor(place);
+    // A loop, since compilers copy the decoding of a texel into each place that calls it. Differences from
+    // the first texel are exactly 0 where all are alike: opaque stays opaque.
     uint corners = is_nearest ? 1u : 4u;
+    vec4 first = vec4(0.0);
     vec4 sum = vec4(0.0);
     for (uint corner = 0u; corner < corners; corner++) {
-        ivec2 step = ivec2(corner & 1u, corner >> 1u);
-        vec2 weight = mix(1.0 - share, share, vec2(step));
-        int column = wrapped_texel(low.x + step.x, wrap_u, used.width);
-        int row = wrapped_texel(low.y + step.y, wrap_v, used.height);
-        sum += weight.x * weight.y * texture_texel(used, ivec2(column, row));
+        ivec2 beside = ivec2(corner & 1u, corner >> 1u);
+        vec2 weight = mix(1.0 - share, share, vec2(beside));
+        int column = wrapped_texel(low.x + beside.x, wrap_u, used.width);
+        int row = wrapped_texel(low.y + beside.y, wrap_v, used.height);
+        vec4 texel = texture_texel(used, ivec2(column, row));
+        first = corner == 0u ? texel : first;
+        sum = corner == 0u ? texel : sum + weight.x * weight.y * (texel - first);
     }
     return sum;
 }
