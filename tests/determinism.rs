@@ -138,6 +138,28 @@ fn pages_of_the_film_make_no_difference() {
     }
 }
 
+/// A device need not dispatch more than 65,535 groups of 64 invocations at once.
+#[test]
+fn a_film_may_have_more_pixels_than_a_dispatch() {
+    let _alone = support::alone();
+    let [width, height] = [2056, 2048];
+    let mut scene = scene();
+    [scene.film.width, scene.film.height] = [width, height];
+    let sums = |window| {
+        let mut renderer =
+            renderer(&scene, Settings { window, depth: 1, ..settings(Sampler::Mis) });
+        renderer.render_pass(1).unwrap();
+        renderer.sums().unwrap()
+    };
+    let whole = sums(None);
+    let [x, y] = [width - 24, height - 16];
+    let corner = sums(Some(Window { x, y, width: 24, height: 16 }));
+    for pixel in 0..corner.pixel_count() {
+        let at = (y + pixel as u32 / 24) * width + x + pixel as u32 % 24;
+        assert_eq!(whole.mean(at as usize), corner.mean(pixel), "pixel {at}");
+    }
+}
+
 /// Every page of the film, of three, is a wave of its own.
 #[test]
 fn a_sweep_that_was_stopped_goes_on_to_the_bit() {

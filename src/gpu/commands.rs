@@ -17,6 +17,8 @@ use super::{
 use crate::error::{Error, Result};
 use crate::shader::constants::WORKGROUP_SIZE;
 
+/// Most invocations of a dispatch over a picture: every device allows 65,535 groups of 64.
+pub(crate) const MOST_INVOCATIONS: u32 = 1 << 21;
 /// Waits for one submission before it is given up; dispatches are sized to take about a tenth of a
 /// second. The clock of a wait goes on while the process is stopped or the machine sleeps, so that
 /// one long wait would end then.

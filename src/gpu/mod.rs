@@ -27,6 +27,7 @@ mod transfer;
 pub use buffer::Buffer;
 pub use capabilities::Capabilities;
 pub use commands::Commands;
+pub(crate) use commands::MOST_INVOCATIONS;
 pub(crate) use denoiser::Denoiser;
 pub use descriptors::DescriptorSet;
 pub use device::{Device, Tracer};

@@ -2,6 +2,8 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet, btree_map::Entry},
+    iter,
+    ops::Range,
     sync::Arc,
     time::Instant,
 };
@@ -23,7 +25,7 @@ use super::{
 use crate::{
     error::Result,
     film::{Sums, Window},
-    gpu::{Commands, DescriptorSet, Device, PassTimes},
+    gpu::{Commands, DescriptorSet, Device, MOST_INVOCATIONS, PassTimes},
     scene::Camera,
     shader::structs::Wave,
 };
@@ -216,17 +218,24 @@ impl Runner {
     ) -> Result<()> {
         let pass = &self.passes[&self.accumulation()];
         self.film.copy_edges(recording.commands(), wave.sample_count);
-        let mut first_pixel = 0;
-        while first_pixel < self.film.padded_pixels() {
-            let left = self.film.padded_pixels() - first_pixel;
-            let pixel_count = self.film.left_in_page(first_pixel).min(left);
+        for Range { start: first_pixel, end } in self.accumulated() {
             let film_start = self.film.first_pixel(first_pixel);
             let film = self.film.set(first_pixel);
             let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
+            let pixel_count = end - first_pixel;
             recording.add(pass, &sets, &Wave { first_pixel, pixel_count, film_start, ..wave })?;
-            first_pixel += pixel_count;
         }
         Ok(())
+    }
+
+    /// Positions in film order of each of these passes: all in one page, and as many as a dispatch may have.
+    fn accumulated(&self) -> impl Iterator<Item = Range<u32>> {
+        let all = self.film.padded_pixels();
+        let after = move |start: u32| {
+            let most = self.film.left_in_page(start).min(MOST_INVOCATIONS);
+            (start < all).then(|| start..all.min(start + most))
+        };
+        iter::successors(after(0), move |before| after(before.end))
     }
 
     /// The pass that adds the samples of a sweep to the film.
@@ -273,7 +282,7 @@ impl Runner {
         let tracer = self.scene.geometry().host_tracer();
         let answers = || self.waves.answers(self.scene.parameters());
         let host = tracer.map(|tracer| (tracer, answers()));
-        let pages = if accumulates { self.film.pages().count() } else { 0 };
+        let pages = if accumulates { self.accumulated().count() } else { 0 };
         if let Entry::Vacant(vacant) = self.passes.entry(self.accumulation()) {
             let pass = Pass::new(&self.device, vacant.key().clone())?;
             vacant.insert(pass);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     error::Result,
-    gpu::{Buffer, Commands, DescriptorSet, Device, Pipeline},
+    gpu::{Buffer, Commands, DescriptorSet, Device, MOST_INVOCATIONS, Pipeline},
     session::Renderer,
     shader::{
         bindings::{VIEW, view},
@@ -13,9 +13,6 @@ use crate::{
         structs::{ShownFilm, WindowFrame},
     },
 };
-
-/// Most invocations of a dispatch: every device allows 65,535 groups of 64.
-const MOST_INVOCATIONS: u32 = 1 << 21;
 
 /// One of the two films that a window can show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
