@@ -25,8 +25,9 @@ use crate::{
     shader::{constants::TRAINING_WAVE, structs::Wave},
 };
 
-/// Training sweeps before the first sample; each covers one pixel in this many.
+/// Training sweeps before the first sample. Together they cover the film, or so many pixels of a larger one.
 const TRAINING_SWEEPS: u32 = 8;
+const MOST_TRAINING_PIXELS: u32 = 1 << 19;
 /// Share of visible rays above which a scene is open and rendered as by `mis`: learning would not pay.
 const OPEN_SHARE: f64 = 0.5;
 
@@ -219,19 +220,22 @@ impl Guided {
 
     /// Trains on sweeps over parts of the film and finds out whether the scene is open.
     fn train(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
+        let pixels = runner.film().padded_pixels();
+        let apart = pixels.div_ceil(MOST_TRAINING_PIXELS);
+        let pixel_stride = TRAINING_SWEEPS * apart;
         for sweep in 0..TRAINING_SWEEPS {
             let wave = Wave {
-                first_pixel: sweep,
+                first_pixel: sweep * apart,
                 first_sample: progress.next_sample(),
                 sample_count: 1,
                 seed: progress.seed ^ TRAINING_SEED,
-                pixel_stride: TRAINING_SWEEPS,
+                pixel_stride,
                 is_training: TRAINING_WAVE,
                 ..Wave::default()
             };
             let wave = with_epoch(wave, wave.first_sample, self.tag);
             let before = runner.totals().clone();
-            runner.sweep(self, wave, runner.film().padded_pixels() / TRAINING_SWEEPS)?;
+            runner.sweep(self, wave, pixels / pixel_stride)?;
             runner.take_counters()?;
             if runner.is_stopped() {
                 return Ok(());
