@@ -239,9 +239,24 @@ fn the_sweep_of_a_window_ends() {
     assert!(stopped.sums().unwrap() == whole, "the window differs");
 }
 
-/// Who interrupts waits for no checkpoint that is due, and a training that was stopped leaves none.
+/// The first pass does not count, since it learns too.
 #[test]
-fn an_interrupt_comes_before_a_checkpoint_that_is_due() {
+fn a_run_by_time_ends_with_the_nearest_sample() {
+    let _alone = support::alone();
+    let mut session = Session::new(support::device(), &scene(), settings(Sampler::Mis)).unwrap();
+    for reason in [None, Some(StopReason::Time)] {
+        let took = session.pass(1, 1.0).unwrap();
+        let met = |share: f64| {
+            session
+                .met(&Rules { seconds: Some(session.seconds() + share * took), ..Rules::default() })
+        };
+        assert_eq!([met(0.6), met(0.4), met(0.0)], [None, reason, Some(StopReason::Time)]);
+    }
+}
+
+/// Who interrupts waits for no checkpoint and no look that is due.
+#[test]
+fn an_interrupt_comes_before_all_else_that_is_due() {
     struct Impatient;
     impl Observer for Impatient {
         fn interrupt(&self) -> Flag {
@@ -250,13 +265,16 @@ fn an_interrupt_comes_before_a_checkpoint_that_is_due() {
             flag
         }
 
-        fn notice(&mut self, _: &Event<'_>) {}
+        fn notice(&mut self, event: &Event<'_>) {
+            assert!(!matches!(event, Event::Look(_)));
+        }
     }
     let _alone = support::alone();
     let folder = Folder::new();
     let path = folder.path().join("room.checkpoint.exr");
     let mut session = Session::new(support::device(), &scene(), settings(Sampler::Mis)).unwrap();
-    let rules = Rules { checkpoints: Some((path.clone(), Duration::ZERO)), ..Rules::default() };
+    let checkpoints = Some((path.clone(), Duration::ZERO));
+    let rules = Rules { checkpoints, error: Some(0.0), ..Rules::default() };
     assert_eq!(session.run(&rules, &mut Impatient).unwrap(), StopReason::Interrupt);
     assert!(session.renderer.sample_count() > 0 && !path.exists());
 }
@@ -353,7 +371,7 @@ fn sample_ranges_add_up() {
         first.add(&rest);
         for pixel in 0..whole.pixel_count() {
             let means = |sums: &Sums| {
-                let groups = sums.groups.iter().flat_map(|group| sums.group_mean(group, pixel));
+                let groups = sums.groups.iter().flat_map(|group| sums.group_means(group)(pixel));
                 sums.total(pixel).into_iter().chain(groups).collect::<Vec<_>>()
             };
             for (a, b) in means(&first).into_iter().zip(means(&whole)) {

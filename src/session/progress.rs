@@ -15,6 +15,13 @@ impl Session {
         rules.seconds.map_or(f64::INFINITY, |seconds| seconds - self.seconds())
     }
 
+    /// Half the seconds of a sample in the last pass, unless that was the first, which also learns: a run by
+    /// time ends with the sample whose end is nearest.
+    fn half_sample(&self) -> f64 {
+        let later = self.last_pass.filter(|(count, _)| *count < self.renderer.sample_count());
+        later.map_or(0.0, |(count, took)| 0.5 * took / f64::from(count))
+    }
+
     /// Returns the rule that is met, if any. A run by time or error renders at least one sample.
     pub fn met(&self, rules: &Rules) -> Option<StopReason> {
         let samples = self.renderer.sample_count();
@@ -24,7 +31,7 @@ impl Session {
         if samples >= self.last_sample(rules) {
             return Some(StopReason::LastSample);
         }
-        if samples > 0 && self.seconds_left(rules) <= 0.0 {
+        if samples > 0 && self.seconds_left(rules) <= self.half_sample() {
             return Some(StopReason::Time);
         }
         let reached = |limit: f64| samples > 1 && self.relative_error.is_some_and(|e| e <= limit);

@@ -88,7 +88,7 @@ pub struct Session {
     /// Duration aimed at for a pass.
     pub pace: Duration,
     /// Samples and seconds of the last pass.
-    last_pass: Option<(u32, f64)>,
+    pub(super) last_pass: Option<(u32, f64)>,
     /// True if a checkpoint of this render lies on the disk.
     has_checkpoint: bool,
     /// Start of the pass under way, for its watch.
@@ -277,7 +277,9 @@ impl Session {
             }
             let seconds = self.pass(self.last_sample(rules) - before, self.seconds_left(rules))?;
             let samples = self.renderer.sample_count() - before;
-            if looks && (Instant::now() >= next_look || rules.error.is_some()) {
+            // Who interrupts does not wait for the error of a large film, nor for a checkpoint.
+            let is_hurried = interrupt.is_raised();
+            if looks && !is_hurried && (Instant::now() >= next_look || rules.error.is_some()) {
                 let start = Instant::now();
                 self.look_at_film(observer)?;
                 if rules.error.is_some()
@@ -292,8 +294,8 @@ impl Session {
                 next_look = Instant::now() + LOOK_INTERVAL.max(20 * start.elapsed());
             }
             if let Some((path, interval)) = &rules.checkpoints
+                && !is_hurried
                 && next_checkpoint.is_some_and(|at| Instant::now() >= at)
-                && !interrupt.is_raised()
             {
                 let start = Instant::now();
                 // A full disk may have room again at the next interval or for the image.
@@ -310,7 +312,6 @@ impl Session {
             self.rate.wall_share = share;
             observer.notice(&Event::Pass { samples, seconds, standing: self.standing(rules) });
         };
-        // Who interrupts does not wait for the error of a large film.
         if looks && reason != StopReason::Interrupt {
             self.look_at_film(observer)?;
         }
