@@ -560,6 +560,11 @@ fn impossible_geometry_is_refused() {
     geometry.triangles[1][2] = 6;
     let error = Accel::build(&geometry, ONE_PAGE).unwrap_err().to_string();
     assert!(error.contains("triangle 1") && error.contains("vertex 6"), "{error}");
+    // Four pages of a triangle each; the tree, which would find the vertex, is not begun.
+    let mut geometry = soup(5, 121);
+    geometry.triangles[1][2] = 99;
+    let error = Accel::build(&geometry, 48).unwrap_err().to_string();
+    assert!(error.contains("5 triangles") && error.contains("hold 4"), "{error}");
     assert!(Accel::build(&soup(1, 1), 47).is_err());
     assert!(device().capabilities().missing().is_empty());
 }

@@ -102,6 +102,8 @@ impl Accel {
         let triangles = meshes.map(|mesh| mesh.triangles.len()).sum();
         let asker = format_args!("the tree over {triangles} triangles");
         memory::check_count(asker, triangles, BUILD_BYTES).map_err(Error::memory)?;
+        // Before the tree, which takes minutes over so many triangles.
+        let page_shift = page_shift(triangles, page_bytes)?;
         stage::enter(format_args!("building {asker}"));
         let mut trees = Trees::default();
         let around_placed = trees.add(geometry)?;
@@ -139,7 +141,6 @@ impl Accel {
             nodes.push([0; 20]);
         }
         nodes.shrink_to_fit();
-        let page_shift = page_shift(scene_triangles.len(), page_bytes)?;
         let mesh_of = |at: usize| {
             let mesh = first_triangles.partition_point(|&first| first as usize <= at) - 1;
             mesh.checked_sub(1).map_or(geometry, |mesh| &geometry.prototypes[mesh])

@@ -35,9 +35,13 @@ pub struct GeometryBuffers {
     host_tracer: Option<HostTracer>,
 }
 
-/// Largest number of bytes in one page of triangles on a device.
+/// Largest number of bytes in one page of triangles on a device, such that one buffer holds the materials of
+/// all pages.
 pub(crate) fn triangle_page_bytes(capabilities: &Capabilities) -> u64 {
-    capabilities.max_texel_buffer_elements.saturating_mul(16)
+    let by_texels = capabilities.max_texel_buffer_elements.saturating_mul(16);
+    let with_material = capabilities.max_storage_buffer_range / size_of::<u32>() as u64;
+    let by_materials = with_material / MAX_TRIANGLE_PAGES as u64;
+    by_texels.min(by_materials.saturating_mul(size_of::<TriangleRecord>() as u64))
 }
 
 impl GeometryBuffers {
