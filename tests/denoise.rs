@@ -10,7 +10,7 @@ use std::{
 
 use fenestra::film::{Attribute, Image};
 
-use crate::support::command::{BALL, Folder, Run, program, yard};
+use crate::support::command::{BALL, Folder, Run, Running, program, yard};
 
 const VARIABLE: &str = "FENESTRA_OIDN";
 const WIDTH: u32 = 24;
@@ -216,6 +216,25 @@ fn options_that_contradict_each_other_are_refused() {
     let arguments =
         ["render", "scene.toml", "-o", "scene.exr", "--denoise", "--stats", "scene.denoised.exr"];
     folder.run(&arguments).assert(2, &["scene.denoised.exr would replace the file of --denoise"]);
+}
+
+/// Which would take 20 s of a film of 3840×2160 pixels on two cores.
+#[test]
+fn an_interrupt_does_not_wait_for_a_large_picture() {
+    let folder = Folder::new();
+    let library = stub(&folder, false);
+    folder.write("scene.toml", yard([32, 24], "constant = [1, 1, 1]", CLAY, BALL));
+    for (size, is_denoised) in [("40x30", true), ("1040x520", false)] {
+        let options = ["render", "scene.toml", "--sampler=mis", "--denoise", "-o=o.exr", "--size"];
+        let options = [&options[..], &[size, "--spp=100000000"]].concat();
+        let variable = Some((VARIABLE, library.as_path()));
+        let running = Running::start_with(variable, folder.path(), &options, "device: ");
+        let told = if is_denoised { "o.denoised.exr" } else { "convert o.exr o.denoised.exr" };
+        running.interrupt().assert(130, &["interrupted", "wrote o.exr", told]);
+        let denoised = folder.path().join("o.denoised.exr");
+        assert_eq!(denoised.exists(), is_denoised, "{size}");
+        fs::remove_file(denoised).unwrap_or_default();
+    }
 }
 
 #[test]

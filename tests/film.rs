@@ -202,7 +202,7 @@ fn the_first_blocks_have_the_samples_of_a_stopped_sweep() {
         sums.ahead.offset = offset;
         for pixel in 0..192 {
             assert!((sums.mean(pixel)[1] - 1.0).abs() < 1e-12, "pixel {pixel}");
-            assert!((sums.group_mean(&group, pixel)[1] - 0.25).abs() < 1e-12, "pixel {pixel}");
+            assert!((sums.group_means(&group)(pixel)[1] - 0.25).abs() < 1e-12, "pixel {pixel}");
         }
     }
 }

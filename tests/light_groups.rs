@@ -39,7 +39,7 @@ fn assert_adds_up(sums: &Sums, label: &str) {
     let pixels = sums.pixel_count();
     let mean = (0..pixels).map(|pixel| of(sums, pixel)).sum::<f64>() / pixels as f64;
     for pixel in 0..pixels {
-        let means: Vec<_> = sums.groups.iter().map(|own| sums.group_mean(own, pixel)).collect();
+        let means: Vec<_> = sums.groups.iter().map(|own| sums.group_means(own)(pixel)).collect();
         for (channel, whole) in sums.mean(pixel).into_iter().enumerate() {
             let sum: f64 = means.iter().map(|mean| mean[channel]).sum();
             let tolerance = 1e-6 * (whole.abs() + mean);
@@ -139,7 +139,7 @@ fn many_lamps_keep_their_groups() {
     assert_adds_up(&sums, "many");
     let total = |sums: &Sums, name: &str| {
         let group = sums.group(name).unwrap();
-        (0..sums.pixel_count()).map(|pixel| sums.group_mean(group, pixel)[1]).sum::<f64>()
+        (0..sums.pixel_count()).map(|pixel| sums.group_means(group)(pixel)[1]).sum::<f64>()
     };
     let lamps = std::mem::take(&mut scene.lamps);
     for name in ["environment", "left", "right"] {

@@ -226,7 +226,7 @@ fn samples_that_are_not_finite_are_counted() {
     let sums = renderer.sums().unwrap();
     assert_eq!(sums.non_finite_count(), 0);
     for pixel in 0..sums.pixel_count() {
-        let means: Vec<_> = sums.groups.iter().map(|own| sums.group_mean(own, pixel)).collect();
+        let means: Vec<_> = sums.groups.iter().map(|own| sums.group_means(own)(pixel)).collect();
         assert!(means.as_flattened().iter().all(|mean| mean.is_finite()), "{pixel}: {means:?}");
     }
     let dark = (0..sums.pixel_count()).filter(|pixel| sums.mean(*pixel) == [0.0; 3]).count();

@@ -19,7 +19,8 @@ impl Sums {
         image.film_size = self.film_size;
         let pixels = || (0..self.pixel_count()).into_par_iter();
         let narrow = |value: [f64; 3]| value.map(|component| component as f32);
-        let means: Vec<[f32; 3]> = pixels().map(|pixel| narrow(self.mean(pixel))).collect();
+        let mean = self.means();
+        let means: Vec<[f32; 3]> = pixels().map(|pixel| narrow(mean(pixel))).collect();
         image.insert_triple(["R", "G", "B"], &means);
         let insert_means = |image: &mut Image, names: [&str; 3], sums: &[[f32; 3]]| {
             if !sums.is_empty() {
@@ -63,7 +64,8 @@ impl Sums {
                 }
                 Aov::LightGroups => {
                     for group in &self.groups {
-                        let mean = |pixel: usize| narrow(self.group_mean(group, pixel));
+                        let means = self.group_means(group);
+                        let mean = |pixel: usize| narrow(means(pixel));
                         let names = GroupSums::channels("Combined", &group.name);
                         let names = names.each_ref().map(String::as_str);
                         image.insert_triple(names, &pixels().map(mean).collect::<Vec<_>>());

@@ -26,22 +26,26 @@ pub(crate) fn shared_offset(filter: Filter, sample_index: u32, seed: u32) -> Opt
     (filter == Filter::Gaussian).then(at)
 }
 
-/// Weights of the samples at `offset` in the pixel before, in the pixel and in the one after, along one axis.
-/// Where a pixel does not exist, the weights of the others still add up to one.
-pub(crate) fn weights(offset: f32, exists: [bool; 3]) -> [f64; 3] {
-    let weight = |at: usize| {
+/// The filter for samples at `offset` in the pixel before, in the pixel and in the one after, along one axis.
+pub(crate) fn falloff(offset: f32) -> [f64; 3] {
+    array::from_fn(|at| {
         let distance = (at as f64 - 1.0 + f64::from(offset)) / SIGMA;
-        if exists[at] { (-0.5 * distance * distance).exp() } else { 0.0 }
-    };
-    let weights: [f64; 3] = array::from_fn(weight);
+        (-0.5 * distance * distance).exp()
+    })
+}
+
+/// Weights of these samples: where a pixel does not exist, those of the others still add up to one.
+pub(crate) fn weights(falloff: [f64; 3], exists: [bool; 3]) -> [f64; 3] {
+    let weights: [f64; 3] = array::from_fn(|at| if exists[at] { falloff[at] } else { 0.0 });
     weights.map(|weight| weight / weights.iter().sum::<f64>())
 }
 
 /// Filters a sample of `width` columns of pixels, row by row, which share its `offset`.
 pub(crate) fn filtered(samples: &[[f32; 3]], width: usize, offset: [f32; 2]) -> Vec<[f32; 3]> {
     let height = samples.len() / width.max(1);
+    let falloffs = offset.map(falloff);
     let along =
-        |at: usize, end: usize, axis: usize| weights(offset[axis], [at > 0, true, at + 1 < end]);
+        |at: usize, end: usize, axis: usize| weights(falloffs[axis], [at > 0, true, at + 1 < end]);
     let pixel = |index: usize| {
         let (row, column) = (index / width, index % width);
         let (rows, columns) = (along(row, height, 1), along(column, width, 0));
@@ -69,7 +73,7 @@ pub(crate) fn variance_share(filter: Filter) -> f64 {
     }
     let squares = |offset: u32| {
         let offset = (f64::from(offset) + 0.5) / f64::from(OFFSETS) - 0.5;
-        weights(offset as f32, [true; 3]).map(|weight| weight * weight).iter().sum::<f64>()
+        weights(falloff(offset as f32), [true; 3]).map(|weight| weight * weight).iter().sum::<f64>()
     };
     ((0..OFFSETS).map(squares).sum::<f64>() / f64::from(OFFSETS)).powi(2)
 }

@@ -5,7 +5,7 @@ use std::{array, collections::BTreeSet};
 use super::{
     group_sums::GroupSums,
     layers::{Aov, COUNTS, COVERAGES, Coverage, TRIPLES},
-    reconstruction::weights,
+    reconstruction::{falloff, weights},
 };
 use crate::shader::constants::FILM_BLOCK;
 
@@ -186,37 +186,55 @@ impl Sums {
 
     /// Mean radiance of one pixel; 0 before the first sample.
     pub fn mean(&self, pixel: usize) -> [f64; 3] {
-        self.mean_of(self.total(pixel), &self.pending, pixel)
+        self.means()(pixel)
     }
 
-    /// Mean radiance of one pixel in the layer of a group of lights.
-    pub fn group_mean(&self, group: &GroupSums, pixel: usize) -> [f64; 3] {
-        let total = joined(group.sum[pixel], group.compensation[pixel]);
-        self.mean_of(total, &group.pending, pixel)
+    /// Mean radiance of pixels.
+    pub(crate) fn means(&self) -> impl Fn(usize) -> [f64; 3] + Sync {
+        self.means_of(|pixel| self.total(pixel), &self.pending)
     }
 
-    fn mean_of(&self, total: [f64; 3], pending: &[[f32; 3]], pixel: usize) -> [f64; 3] {
-        if self.ahead.is_none() {
-            let count = f64::from(self.sample_count.max(1));
-            return total.map(|total| total / count);
+    /// Mean radiance of pixels in the layer of a group of lights.
+    pub fn group_means(&self, group: &GroupSums) -> impl Fn(usize) -> [f64; 3] + Sync {
+        let total = |pixel: usize| joined(group.sum[pixel], group.compensation[pixel]);
+        self.means_of(total, &group.pending)
+    }
+
+    fn means_of(
+        &self,
+        total: impl Fn(usize) -> [f64; 3] + Sync,
+        pending: &[[f32; 3]],
+    ) -> impl Fn(usize) -> [f64; 3] + Sync {
+        let falloffs = self.ahead.offset.map_or([[0.0, 1.0, 0.0]; 2], |offset| offset.map(falloff));
+        move |pixel| {
+            let (pending, more) = match self.ahead.is_none() {
+                true => ([0.0; 3], 0.0),
+                false => self.pending_at(pixel, pending, &falloffs),
+            };
+            let weight = f64::from(self.sample_count) + more;
+            let weight = if weight > 0.0 { weight } else { 1.0 };
+            let total = total(pixel);
+            array::from_fn(|channel| (total[channel] + pending[channel]) / weight)
         }
-        let (pending, weight) = self.pending_at(pixel, pending);
-        let weight = f64::from(self.sample_count) + weight;
-        let weight = if weight > 0.0 { weight } else { 1.0 };
-        array::from_fn(|channel| (total[channel] + pending[channel]) / weight)
     }
 
     /// The filtered sample of a stopped sweep at a pixel: Σ weight · radiance over the pixels that have
-    /// one, and the sum of these weights, up to 1.
-    fn pending_at(&self, pixel: usize, pending: &[[f32; 3]]) -> ([f64; 3], f64) {
+    /// one, and the sum of these weights, up to 1. `falloffs` are those of the filter along both axes.
+    fn pending_at(
+        &self,
+        pixel: usize,
+        pending: &[[f32; 3]],
+        falloffs: &[[f64; 3]; 2],
+    ) -> ([f64; 3], f64) {
         let place = self.place(pixel);
+        let rows_ahead = self.ahead.blocks.div_ceil(self.width.div_ceil(FILM_BLOCK)) * FILM_BLOCK;
+        if place[1] > rows_ahead {
+            return ([0.0; 3], 0.0);
+        }
         let ends = [self.width, self.height];
-        let weights: [[f64; 3]; 2] = array::from_fn(|axis| match self.ahead.offset {
-            Some(offset) => {
-                let at = place[axis];
-                weights(offset[axis], [at > 0, true, at + 1 < ends[axis]])
-            }
-            None => [0.0, 1.0, 0.0],
+        let weights: [[f64; 3]; 2] = array::from_fn(|axis| {
+            let at = place[axis];
+            weights(falloffs[axis], [at > 0, true, at + 1 < ends[axis]])
         });
         let (mut value, mut sum) = ([0.0; 3], 0.0);
         for (y, row) in weights[1].into_iter().enumerate() {
@@ -275,11 +293,12 @@ impl Sums {
         }
         let average = |value: [f64; 3]| (value[0] + value[1] + value[2]) / 3.0;
         let pixel_count = self.pixel_count();
-        let image_mean = (0..pixel_count).map(|pixel| average(self.mean(pixel))).sum::<f64>()
-            / pixel_count as f64;
+        let means = self.means();
+        let image_mean =
+            (0..pixel_count).map(|pixel| average(means(pixel))).sum::<f64>() / pixel_count as f64;
         let floor = 0.01 * image_mean * image_mean;
         let relative = |pixel: usize| {
-            let mean = average(self.mean(pixel));
+            let mean = average(means(pixel));
             let error = average(self.variance_of_mean(pixel).map(f64::sqrt));
             if error == 0.0 { 0.0 } else { error / (mean * mean + floor).sqrt() }
         };

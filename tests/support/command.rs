@@ -75,9 +75,20 @@ impl Running {
     /// Starts the program in `folder` and waits for a message with this text. The program heeds
     /// signals also where the tests run under `nohup`, whose children ignore hangups.
     pub fn start(folder: &Path, arguments: &[&str], text: &str) -> Self {
+        Self::start_with(None, folder, arguments, text)
+    }
+
+    /// As [`Running::start`], with a variable of the environment.
+    pub fn start_with(
+        variable: Option<(&str, &Path)>,
+        folder: &Path,
+        arguments: &[&str],
+        text: &str,
+    ) -> Self {
         let mut heeding = Command::new("env");
         heeding.args(["--default-signal=HUP,INT,TERM", env!("CARGO_BIN_EXE_fenestra")]);
         prepare(&mut heeding, folder);
+        heeding.envs(variable);
         let mut child =
             heeding.args(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut messages = BufReader::new(child.stderr.take().unwrap());

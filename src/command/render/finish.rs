@@ -17,6 +17,10 @@ use crate::{
     terminal::say,
 };
 
+/// Pixels of the largest picture that is denoised after an interrupt, for which a processor of two cores takes
+/// a second: who interrupts may not wait.
+const MOST_DENOISED_IN_HASTE: u64 = 1 << 19;
+
 impl RenderJob<'_> {
     /// Writes the image, then what it continues from, then all other files asked for, each of them even
     /// if another fails.
@@ -70,8 +74,17 @@ impl RenderJob<'_> {
             let preview = |rgb| write_preview(&path, &rgb, self.arguments.exposure);
             note(&path, image.rgb(&self.output).and_then(preview));
         }
+        let pixels = u64::from(image.width) * u64::from(image.height);
         if let Some(denoiser) = self.denoiser {
-            self.write_denoised(denoiser, image, &mut note);
+            if is_interrupted && pixels > MOST_DENOISED_IN_HASTE {
+                let denoised = denoised_path(&self.output, "exr");
+                let [film, denoised] = [&self.output, &denoised].map(|path| display(path));
+                log::warn!(
+                    "interrupted, so not denoised: fenestra convert {film} {denoised} --denoise"
+                );
+            } else {
+                self.write_denoised(denoiser, image, &mut note);
+            }
         } else if self.arguments.shows() && !self.arguments.quiet {
             say!("not denoised: Open Image Denoise is not found; ./setup brings it where it can");
         }
