@@ -7,6 +7,7 @@ use std::{fmt::Write, process::Command};
 use fenestra::{film::Image, view::keys};
 
 use crate::support::{
+    self,
     command::{self, BALL, Folder, yard},
     faulty_layer, page,
     x11::{Server, View},
@@ -113,6 +114,37 @@ fn the_window_shows_what_render_writes() {
     view.tap("Escape");
     let run = view.end();
     run.assert(0, &["wrote yard.view-1.png, yard.view-1.exr, yard.view-1.toml"]);
+}
+
+/// Such films have fewer pixels than the window on devices that take long for a whole one.
+#[test]
+fn a_film_of_a_moving_camera_shows_no_blocks() {
+    const SIZE: [u32; 2] = [256, 192];
+    if !support::is_software() {
+        return;
+    }
+    let folder = folder();
+    let server = Server::start();
+    let options = ["--size", "256x192", "--sampler", "mis", "--shadow-rays", "256"];
+    let mut view = View::open(&server, &folder, "room.toml", &options, SIZE);
+    view.press("d");
+    view.wait_for("moving");
+    std::thread::sleep(std::time::Duration::from_millis(1000));
+    let picture = view.picture(SIZE);
+    view.release("d");
+    // From left to right, blocks of 8×8 pixels change in an eighth of the columns alone.
+    let mut changes = vec![0_u32; SIZE[0] as usize - 1];
+    for row in picture.chunks_exact(SIZE[0] as usize) {
+        for (change, pair) in changes.iter_mut().zip(row.windows(2)) {
+            *change += u32::from(pair[0][1].abs_diff(pair[1][1]));
+        }
+    }
+    changes.sort_unstable();
+    let all: u32 = changes.iter().sum();
+    let most: u32 = changes[7 * changes.len() / 8..].iter().sum();
+    assert!(2 * most < all, "{most} of {all} levels of change lie in an eighth of the columns");
+    view.tap("Escape");
+    view.end().assert(0, &[]);
 }
 
 /// Mean absolute difference over the mean.

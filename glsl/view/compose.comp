@@ -17,6 +17,17 @@ layout(scalar, push_constant) uniform WindowFrameConstants {
 // Grey around the film.
 const vec3 AROUND = vec3(0.13);
 
+// Display values of a pixel of a film.
+vec3 film_value(bool is_right, uint place) {
+    vec3 value;
+    if (is_right) {
+        value = shown_right[place];
+    } else {
+        value = shown[place];
+    }
+    return tone_map(value, frame.exposure, frame.curve);
+}
+
 // Returns display values of a pixel of the window.
 vec3 pixel_at(uvec2 at) {
     if (at.x < frame.left || at.y < frame.top || at.x >= frame.left + frame.shown_width
@@ -35,15 +46,23 @@ vec3 pixel_at(uvec2 at) {
     bool is_right = at.x > frame.split;
     uvec2 film_size = is_right ? uvec2(frame.right_width, frame.right_height)
                                : uvec2(frame.film_width, frame.film_height);
-    uvec2 pixel = inside * film_size / uvec2(frame.shown_width, frame.shown_height);
-    uint place = pixel.y * film_size.x + pixel.x;
-    vec3 value;
-    if (is_right) {
-        value = shown_right[place];
-    } else {
-        value = shown[place];
+    if (frame.is_reduced == 0u) {
+        uvec2 pixel = inside * film_size / uvec2(frame.shown_width, frame.shown_height);
+        return film_value(is_right, pixel.y * film_size.x + pixel.x);
     }
-    return tone_map(value, frame.exposure, frame.curve);
+    // A smaller film than the scene's stands in for it: pixels as large as blocks would hide what it shows.
+    vec2 scale = vec2(film_size) / vec2(frame.shown_width, frame.shown_height);
+    vec2 place = max((vec2(inside) + 0.5) * scale - 0.5, 0.0);
+    uvec2 low = min(uvec2(place), film_size - 1u);
+    vec2 share = place - vec2(low);
+    vec3 value = vec3(0.0);
+    for (uint corner = 0u; corner < 4u; corner++) {
+        uvec2 by = uvec2(corner & 1u, corner >> 1u);
+        uvec2 pixel = min(low + by, film_size - 1u);
+        float weight = (by.x == 0u ? 1.0 - share.x : share.x) * (by.y == 0u ? 1.0 - share.y : share.y);
+        value += weight * film_value(is_right, pixel.y * film_size.x + pixel.x);
+    }
+    return value;
 }
 
 void main() {

@@ -547,6 +547,8 @@ structs! {
         right_width: uint,
         /// Height of the film to its right, pixels.
         right_height: uint,
+        /// 1 if the films have fewer pixels than the scene's, which are interpolated.
+        is_reduced: uint,
         /// First column of the window that shows the film to the right; its width where there is none.
         split: uint,
         /// First pixel of the dispatch in the window.

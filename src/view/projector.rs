@@ -178,6 +178,7 @@ impl Projector {
             film_height: self.sizes[0][1],
             right_width: self.sizes[1][0],
             right_height: self.sizes[1][1],
+            is_reduced: u32::from(self.sizes[0] != self.film),
             split: if has_right { left + shown_width / 2 } else { width },
             first_index: 0,
             exposure,

@@ -313,8 +313,8 @@ impl Worker {
         let is_due = self.looked_at.is_none_or(|at| at.elapsed() >= LOOK_INTERVAL);
         if is_due && layer == SHOW_ERROR && self.parts.left.sample_count() > 0 {
             let sums = self.parts.left.session.renderer.sums()?;
-            let total: f64 =
-                (0..sums.pixel_count()).map(|i| sums.mean(i).iter().sum::<f64>()).sum();
+            let mean = sums.means();
+            let total: f64 = (0..sums.pixel_count()).map(|i| mean(i).iter().sum::<f64>()).sum();
             self.mean_radiance = (total / (3.0 * sums.pixel_count() as f64)) as f32;
             self.looked_at = Some(Instant::now());
         }
