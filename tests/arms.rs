@@ -118,6 +118,12 @@ fn whoever_goes_on_takes_the_recorded_arm() {
         roulette_throughput: 0.1,
     };
     let other = GuideState { arm: Some(lean), arm_since: 8, ..state.clone() };
+    // So is the sample from which it has random numbers of its own, also if it is the arm of the start.
+    for arm in [lean, state.arm.unwrap()] {
+        let later = GuideState { arm: Some(arm), ..other.clone() };
+        let second = go_on(guided(None), &later);
+        assert_eq!(second.guide_state().unwrap().unwrap().arm_since, 8, "{arm}");
+    }
     let recorded = |settings| go_on(settings, &other).guide_state().unwrap().unwrap().arm.unwrap();
     assert_eq!(recorded(guided(None)), lean);
     let mut settings = guided(None);

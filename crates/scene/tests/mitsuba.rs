@@ -480,7 +480,9 @@ fn lamps_shine_where_they_look() {
           <float name="cutoff_angle" value="40"/></emitter>
         <emitter type="directional"><vector name="direction" value="0,-2,0"/>
           <rgb name="irradiance" value="1,2,3"/></emitter>
-        <emitter type="point"><point name="position" x="1" z="2"/></emitter>"#,
+        <emitter type="point"><point name="position" x="1" z="2"/></emitter>
+        <emitter type="spot"><float name="cutoff_angle" value="40"/>
+          <float name="beam_width" value="60"/></emitter>"#,
     );
     assert_eq!(scene.warnings, [""; 0]);
     let LampKind::Spot(spot) = scene.lamps[0].kind else { panic!() };
@@ -493,6 +495,10 @@ fn lamps_shine_where_they_look() {
     assert_eq!(scene.lamps[1].kind, LampKind::Directional { direction: Vec3::NEG_Y, irradiance });
     let position = Vec3::new(1.0, 0.0, 2.0);
     assert_eq!(scene.lamps[2].kind, LampKind::Point { position, intensity: Vec3::ONE });
+    // A beam as wide as the cone has an edge that other formats can say.
+    let LampKind::Spot(sharp) = scene.lamps[3].kind else { panic!() };
+    let edges = sharp.inner_angle_rad..sharp.outer_angle_rad;
+    assert!(edges.contains(&(0.9995 * sharp.outer_angle_rad)) && edges.start > 0.69, "{edges:?}");
 
     let folder = Folder::new();
     write_image(&folder, "a.png");

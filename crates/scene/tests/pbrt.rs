@@ -420,6 +420,33 @@ fn images_are_scaled_inverted_mixed_and_placed() {
 }
 
 #[test]
+fn an_image_is_decoded_as_each_texture_says() {
+    let folder = Folder::new();
+    let grey = folder.path().join("a.png");
+    image::save_buffer(grey, &[128; 3], 1, 1, image::ColorType::Rgb8).unwrap();
+    let value = 128.0_f32 / 255.0;
+    let expected = [
+        ("sRGB", ((value + 0.055) / 1.055).powf(2.4)),
+        ("linear", value),
+        ("gamma 2.2", value.powf(2.2)),
+        ("gamma 1.8", value.powf(1.8)),
+    ];
+    let textured = expected.map(|(encoding, _)| {
+        format!(
+            r#"Texture "{encoding}" "spectrum" "imagemap" "string filename" "a.png"
+            "string encoding" "{encoding}"
+            Material "diffuse" "texture reflectance" "{encoding}" {TRIANGLE}"#
+        )
+    });
+    let text = format!("{MIRRORED} WorldBegin {}", textured.join("\n"));
+    let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
+    for (material, (encoding, expected)) in scene.materials.iter().zip(expected) {
+        let mean = material.surface.color.as_ref().unwrap().mean()[0];
+        assert!((mean - expected).abs() < 1e-3, "{encoding}: {mean}, expected {expected}");
+    }
+}
+
+#[test]
 fn numbers_are_opacity_or_colours_and_roughness_is_mapped() {
     let float = r#"Texture "f" "float" "imagemap" "string filename" "a.png""#;
     let folder = Folder::new();
@@ -459,7 +486,8 @@ fn lamps_have_their_places_and_powers() {
         LightSource "point" "rgb I" [1 2 3] "float scale" 2 "point3 from" [0 1 0]
         LightSource "point" "float power" 12.566371
         LightSource "distant" "point3 from" [0 1 0] "point3 to" [0 0 0] "float illuminance" 3
-        LightSource "spot" "float coneangle" 40 "float conedeltaangle" 10 "point3 to" [1 0 0]"#;
+        LightSource "spot" "float coneangle" 40 "float conedeltaangle" 10 "point3 to" [1 0 0]
+        LightSource "spot" "float coneangle" 60 "float conedeltaangle" 60 "float power" 3"#;
     let scene = world(text);
     let kinds: Vec<_> = scene.lamps.iter().map(|lamp| lamp.kind).collect();
     assert_eq!(
@@ -475,6 +503,10 @@ fn lamps_have_their_places_and_powers() {
     assert_eq!((spot.direction, spot.falloff), (Vec3::X, SpotFalloff::SmoothCosine));
     assert!((spot.inner_angle_rad - 30_f32.to_radians()).abs() < 1e-6);
     assert!((spot.outer_angle_rad - 40_f32.to_radians()).abs() < 1e-6);
+    // A smooth edge lets half of the light through: here (cos 0 + cos 60°) / 2 is 3/4.
+    let LampKind::Spot(spot) = kinds[4] else { panic!() };
+    let power = 2.0 * std::f32::consts::PI * (1.0 - 0.75) * spot.intensity;
+    assert!((power - 3.0).length() < 1e-4, "{power}");
     assert_eq!(warnings(&scene), [""; 0]);
     // A plain camera mirrors the world in z.
     let far = load(VIEW, r#"LightSource "point" "point3 from" [0 0 4]"#);

@@ -160,8 +160,10 @@ impl Guided {
         self.is_trained = true;
         self.start_with(self.arms.first(self.is_open));
         if let Some(arm) = state.arm.filter(|_| state.is_open == self.is_open) {
-            self.take_arm(self.arms.conform(arm, self.is_open), state.arm_since);
-            self.choice.races = state.races;
+            let arm = self.arms.conform(arm, self.is_open);
+            self.steps = self.arms.steps(&arm);
+            let (since, races) = (state.arm_since, state.races);
+            self.choice = Choice { since, races, ..Choice::of(arm) };
         }
         runner.warm_up(self)?;
         Ok(has_moved)
