@@ -146,8 +146,10 @@ fn a_film_may_have_more_pixels_than_a_dispatch() {
     let mut scene = scene();
     [scene.film.width, scene.film.height] = [width, height];
     let sums = |window| {
-        let mut renderer =
-            renderer(&scene, Settings { window, depth: 1, ..settings(Sampler::Mis) });
+        // Other layers would divide the film into pages.
+        let aovs = Vec::new();
+        let one_page = Settings { window, depth: 1, aovs, ..settings(Sampler::Mis) };
+        let mut renderer = renderer(&scene, one_page);
         renderer.render_pass(1).unwrap();
         renderer.sums().unwrap()
     };
