@@ -351,6 +351,7 @@ fn quantized_attributes_are_numbers() {
     assert_eq!(mesh.uvs[0], [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]]);
     assert_eq!(mesh.colors[0], [1.0, 0.2, 0.0, 0.4]);
     assert!(mesh.materials[0].material.surface.vertex_color);
+    assert_eq!(load(r#"{"alphaMode": "MASK"}"#).colors[0], mesh.colors[0]);
     assert_eq!(load("{}").colors[2], [0.0, 0.0, 0.0, 1.0], "opaque materials ignore alpha");
 }
 

@@ -794,11 +794,13 @@ fn lamps_of_an_included_file_are_placed_with_it() {
     let folder = Folder::new();
     let text = r#"{"asset": {"version": "2.0"}, "extensionsUsed": ["KHR_lights_punctual"],
         "extensions": {"KHR_lights_punctual": {"lights": [
-            {"type": "point", "intensity": 10}, {"type": "directional", "intensity": 10}]}},
+            {"type": "point", "intensity": 10}, {"type": "directional", "intensity": 10},
+            {"type": "spot", "intensity": 10, "spot": {}}]}},
         "nodes": [
             {"translation": [1, 0, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
-            {"extensions": {"KHR_lights_punctual": {"light": 1}}}],
-        "scenes": [{"nodes": [0, 1]}], "scene": 0}"#;
+            {"extensions": {"KHR_lights_punctual": {"light": 1}}},
+            {"translation": [1, 0, 0], "extensions": {"KHR_lights_punctual": {"light": 2}}}],
+        "scenes": [{"nodes": [0, 1, 2]}], "scene": 0}"#;
     let path = folder.write("lamps.gltf", text);
     let own = Mesh::read(&path, &mut Vec::new()).unwrap().lamps;
     let LampKind::Point { intensity: own, .. } = own[0].kind else { unreachable!() };
@@ -806,12 +808,15 @@ fn lamps_of_an_included_file_are_placed_with_it() {
                    translate = [0, 5, 0]\n";
     let scene = folder.load(&format!("{HEAD}{include}")).unwrap();
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
-    let [point, sun] = &scene.lamps[..] else { unreachable!() };
+    let [point, sun, spot] = &scene.lamps[..] else { unreachable!() };
     let LampKind::Point { position, intensity } = point.kind else { unreachable!() };
     assert_eq!(position, Vec3::new(0.0, 5.0, -2.0));
     assert!(intensity.abs_diff_eq(4.0 * own, 1e-4 * own.x), "{intensity} of {own}");
     let LampKind::Directional { direction, .. } = sun.kind else { unreachable!() };
     assert!(direction.abs_diff_eq(Vec3::NEG_X, 1e-6), "along −Z in the file: {direction}");
+    let LampKind::Spot(spot) = spot.kind else { unreachable!() };
+    assert_eq!((spot.position, spot.intensity), (position, intensity));
+    assert!(spot.direction.abs_diff_eq(Vec3::NEG_X, 1e-6), "{}", spot.direction);
 }
 
 #[test]

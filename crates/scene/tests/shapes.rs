@@ -209,6 +209,12 @@ fn tubes_have_the_volume_of_their_path() {
     assert_eq!(check_closed(&shape("tube", bent).unwrap()).1, 2);
     let sharp = "radius = 0.05\nsmooth = 1\npath = [[0,0,0],[0,1,0],[1,1,0],[1,1,1]]";
     assert_eq!(check_closed(&shape("tube", sharp).unwrap()).1, 2);
+    // A spline through these radii falls to 0.05 in the middle. The ends have a vertex on the axis.
+    let waist = "radius = [0.5, 0.1, 0.1, 0.5]\npath = [[0,0,0],[1,0,0],[2,0,0],[3,0,0]]";
+    let waist = shape("tube", waist).unwrap();
+    let radii = waist.positions.iter().map(|[_, y, z]| y.hypot(*z));
+    let least = radii.filter(|radius| *radius > 0.01).fold(f32::INFINITY, f32::min);
+    assert!((least - 0.1).abs() < 1e-6, "{least}");
 }
 
 #[test]
