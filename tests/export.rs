@@ -9,11 +9,11 @@ use fenestra::{
     film::Image,
     scene::{
         Scene,
-        export::{Settings, mitsuba::export, pbrt},
+        export::{Settings, gltf, mitsuba::export, pbrt},
         lamp::LampKind,
         material::MaterialKind,
         measured::{MeasuredTable, RglTraits},
-        texture::TextureUse,
+        texture::{TextureUse, Wrap},
     },
     surface::TextureTables,
 };
@@ -305,6 +305,22 @@ fn textures_are_the_same_at_all_coordinates() {
 }
 
 #[test]
+fn of_two_ways_to_continue_an_image_mitsuba_has_that_of_u() {
+    let folder = Folder::new();
+    write_square(&folder);
+    let clay = "type = \"diffuse\"\nreflectance = { texture = \"four colours.png\" }";
+    let text = yard([8, 6], "constant = [0, 0, 0]", clay, "mesh = \"square.obj\"");
+    let mut ours = Scene::load(&folder.write("scene.toml", text)).unwrap();
+    ours.materials[0].surface.color.as_mut().unwrap().wrap = [Wrap::Clamp, Wrap::Mirror];
+    let path = folder.path().join("out.xml");
+    let exported = export(&ours, &path, SETTINGS);
+    exported.write().unwrap();
+    assert!(matches!(&exported.warnings[..], [one] if one.contains("that of u")));
+    let read = Scene::load(&path).unwrap();
+    assert_eq!(read.materials[0].surface.color.as_ref().unwrap().wrap, [Wrap::Clamp; 2]);
+}
+
+#[test]
 fn one_image_serves_all_uses_of_equal_values() {
     let use_of = |channel| format!("{{ texture = \"four colours.png\", channel = \"{channel}\" }}");
     let clay = format!(
@@ -545,4 +561,35 @@ fn colours_of_vertices_are_written_with_their_factor() {
     scene.geometry.colors.iter_mut().for_each(|color| color[3] = 0.5);
     let exported = export(&scene, &path, SETTINGS);
     assert!(matches!(&exported.warnings[..], [one] if one.contains("opacity of its vertices")));
+    // glTF has it, for materials that are not opaque.
+    let path = folder.path().join("out.gltf");
+    gltf::export(&scene, &path).write().unwrap();
+    let read = Scene::load(&path).unwrap();
+    let alphas =
+        |scene: &Scene| scene.geometry.colors.iter().filter(|color| color[3] == 0.5).count();
+    assert!(alphas(&read) > 0, "{:?}", read.geometry.colors.first());
+}
+
+/// Numbers of images are at most 1 in glTF.
+#[test]
+fn images_of_radiance_keep_it_in_gltf() {
+    let folder = Folder::new();
+    write_square(&folder);
+    let mut image = Image::new(2, 2);
+    image.insert_triple(["R", "G", "B"], &[[4.0, 2.0, 0.5]; 4]);
+    image.write_exr(&folder.path().join("bright.exr")).unwrap();
+    let clay = format!(
+        "{DIFFUSE}\nemission = {{ texture = \"bright.exr\", factor = [2, 1, 1], wrap = \"clamp\" }}"
+    );
+    let text = yard([8, 6], "constant = [0, 0, 0]", &clay, "mesh = \"square.obj\"");
+    let ours = Scene::load(&folder.write("scene.toml", text)).unwrap();
+    let path = folder.path().join("out.gltf");
+    gltf::export(&ours, &path).write().unwrap();
+    let read = Scene::load(&path).unwrap();
+    let [ours, read] = [&ours, &read].map(|scene| {
+        let emission = scene.materials[0].surface.emission.as_ref().unwrap();
+        emission.radiance * value_at(emission.texture.as_ref().unwrap(), Vec2::splat(0.5))
+    });
+    assert!(ours.abs_diff_eq(Vec3::new(8.0, 2.0, 0.5), 1e-3), "{ours}");
+    assert!(read.abs_diff_eq(ours, 0.02 * ours.x), "{read}, expected {ours}");
 }
