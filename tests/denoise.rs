@@ -218,7 +218,7 @@ fn options_that_contradict_each_other_are_refused() {
     folder.run(&arguments).assert(2, &["scene.denoised.exr would replace the file of --denoise"]);
 }
 
-/// Which would take 20 s of a film of 3840×2160 pixels on two cores.
+/// The filter takes 20 s of a film of 3840×2160 pixels on two cores.
 #[test]
 fn an_interrupt_does_not_wait_for_a_large_picture() {
     let folder = Folder::new();

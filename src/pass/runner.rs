@@ -283,10 +283,8 @@ impl Runner {
         let answers = || self.waves.answers(self.scene.parameters());
         let host = tracer.map(|tracer| (tracer, answers()));
         let pages = if accumulates { self.accumulated().count() } else { 0 };
-        if let Entry::Vacant(vacant) = self.passes.entry(self.accumulation()) {
-            let pass = Pass::new(&self.device, vacant.key().clone())?;
-            vacant.insert(pass);
-        }
+        let accumulation = self.accumulation();
+        made(&mut self.passes, &self.device, accumulation)?;
         let most_passes = (vertices.len() + end.len() + pages) as u32;
         let ends = self.settings.path_lists != PathLists::Never;
         let mut recording = Recording::begin(&self.device, most_passes, host, ends)?;
@@ -298,13 +296,7 @@ impl Runner {
             if !lives && place < of_vertices {
                 continue;
             }
-            let pass = match self.passes.entry(kernel) {
-                Entry::Occupied(occupied) => occupied.into_mut(),
-                Entry::Vacant(vacant) => {
-                    let pass = Pass::new(&self.device, vacant.key().clone())?;
-                    vacant.insert(pass)
-                }
-            };
+            let pass = made(&mut self.passes, &self.device, kernel)?;
             lives &= recording.add(pass, &sets, &wave)?;
             self.totals.passes += u64::from(lives || place >= of_vertices);
         }
@@ -424,6 +416,21 @@ impl Runner {
         bytes.extend(self.sharing.iter().flat_map(SharingBuffers::buffer_bytes));
         bytes.extend(self.film.buffer_bytes());
         bytes
+    }
+}
+
+/// The pass of a kernel, made if it is missing. Fails if the device does.
+fn made<'a>(
+    passes: &'a mut BTreeMap<Kernel, Pass>,
+    device: &Arc<Device>,
+    kernel: Kernel,
+) -> Result<&'a Pass> {
+    match passes.entry(kernel) {
+        Entry::Occupied(occupied) => Ok(occupied.into_mut()),
+        Entry::Vacant(vacant) => {
+            let pass = Pass::new(device, vacant.key().clone())?;
+            Ok(vacant.insert(pass))
+        }
     }
 }
 

@@ -17,8 +17,8 @@ use crate::{
     terminal::say,
 };
 
-/// Pixels of the largest picture that is denoised after an interrupt, for which a processor of two cores takes
-/// a second: who interrupts may not wait.
+/// Pixels of the largest picture that is denoised after an interrupt. It takes two cores a second, and who
+/// interrupts may not wait.
 const MOST_DENOISED_IN_HASTE: u64 = 1 << 19;
 
 impl RenderJob<'_> {
