@@ -158,12 +158,11 @@ impl Guided {
             self.tag = state.epoch_tag();
         }
         self.is_trained = true;
-        self.start_with(self.arms.first(self.is_open));
         if let Some(arm) = state.arm.filter(|_| state.is_open == self.is_open) {
-            let arm = self.arms.conform(arm, self.is_open);
-            self.steps = self.arms.steps(&arm);
-            let (since, races) = (state.arm_since, state.races);
-            self.choice = Choice { since, races, ..Choice::of(arm) };
+            self.start_with(self.arms.conform(arm, self.is_open));
+            (self.choice.since, self.choice.races) = (state.arm_since, state.races);
+        } else {
+            self.start_with(self.arms.first(self.is_open));
         }
         runner.warm_up(self)?;
         Ok(has_moved)
