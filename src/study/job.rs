@@ -49,17 +49,18 @@ impl RunJob<'_> {
             Rule::Spp(_) => None,
             Rule::Seconds(seconds) => Some(seconds),
         };
+        let by_time = Rules { seconds: limit, ..Rules::default() };
         let mut measurements: Vec<Measurement> = Vec::new();
         loop {
             let samples = Some(self.next_stop(session.renderer.sample_count()));
-            let rules = Rules { samples, seconds: limit, ..Rules::default() };
+            let rules = Rules { samples, ..by_time.clone() };
             watch.run(session, &rules, limit.is_some())?;
             let (mut measurement, picture) =
                 Measurement::of(session, self.reference, self.surfaces)?;
             let spp = measurement.spp;
             let is_level = match self.rule {
                 Rule::Spp(_) => self.levels.contains(&spp),
-                Rule::Seconds(seconds) => session.seconds() >= seconds,
+                Rule::Seconds(_) => session.met(&by_time).is_some(),
             };
             if is_level {
                 let level = if limit.is_some() { self.rule } else { Rule::Spp(spp) };

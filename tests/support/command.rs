@@ -7,6 +7,7 @@ use std::{
     io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
     process::{Child, ChildStderr, Command, Output, Stdio},
+    sync::mpsc,
     thread,
     time::{Duration, Instant},
 };
@@ -113,9 +114,7 @@ impl Running {
             let mut text = String::new();
             messages.read_to_string(&mut text).map(|_| text)
         });
-        // The shell's own `kill`: the program of that name is not on every system.
-        let kill = format!("kill -{name} {}", child.id());
-        assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+        send(name, child.id());
         let start = Instant::now();
         let status = loop {
             if let Some(status) = child.try_wait().unwrap() {
@@ -131,9 +130,30 @@ impl Running {
     }
 }
 
+/// Sends a signal by the shell's own `kill`: the program of that name is not on every system.
+fn send(signal: &str, process: u32) {
+    let kill = format!("kill -{signal} {process}");
+    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+}
+
 impl Folder {
     /// Runs the program in this folder.
+    ///
+    /// # Panics
+    /// If it has not ended after ten minutes.
+    #[track_caller]
     pub fn run(&self, arguments: &[impl AsRef<OsStr>]) -> Run {
-        Run::of(&program(self.path()).args(arguments).output().expect("the program starts"))
+        const LONGEST: Duration = Duration::from_secs(600);
+        let mut command = program(self.path());
+        command.args(arguments).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let child = command.spawn().expect("the program starts");
+        let id = child.id();
+        let (sender, ended) = mpsc::channel();
+        thread::spawn(move || sender.send(child.wait_with_output()));
+        let Ok(output) = ended.recv_timeout(LONGEST) else {
+            send("KILL", id);
+            panic!("{command:?} has not ended");
+        };
+        Run::of(&output.expect("the output can be read"))
     }
 }
