@@ -601,16 +601,21 @@ fn rays_that_are_given_up_are_counted_with_their_pixels() {
     let faces: Vec<&str> = faces.iter().map(String::as_str).collect();
     let crowd = ["-0.1 -0.1 0.5", "0.1 -0.1 0.5", "0 0.1 0.5"];
     folder.write("quad.ply", ply(&[&QUAD_VERTICES[..], &crowd].concat(), &faces));
-    let run = folder.run(&[&RENDER[..], &["--tracer", "device"]].concat());
-    run.assert(0, &["rays were given up after too many steps of traversal"]);
-    let bounds = run.messages.split("within --crop ").nth(1).unwrap();
-    let bounds = bounds.split(' ').next().unwrap().split(',').map(|bound| bound.parse::<u32>());
-    let [left, top, right, bottom] = bounds.collect::<Result<Vec<_>, _>>().unwrap()[..] else {
-        panic!("expected four bounds in {}", run.messages)
+    let bounds = |crop: &[&str]| {
+        let run = folder.run(&[&RENDER[..], &["--tracer", "device"], crop].concat());
+        run.assert(0, &["rays were given up after too many steps of traversal"]);
+        let bounds = run.messages.split("within --crop ").nth(1).unwrap();
+        let bounds = bounds.split(' ').next().unwrap().split(',').map(|bound| bound.parse::<u32>());
+        let [left, top, right, bottom] = bounds.collect::<Result<Vec<_>, _>>().unwrap()[..] else {
+            panic!("expected four bounds in {}", run.messages)
+        };
+        // The crowd itself, and pixels of the quad whose shadow rays meet it.
+        assert!((1..8).contains(&left) && (1..6).contains(&top), "{}", run.messages);
+        assert!((9..=16).contains(&right) && (7..=12).contains(&bottom), "{}", run.messages);
+        [left, top, right, bottom]
     };
-    // The crowd itself, and pixels of the quad whose shadow rays meet it.
-    assert!((1..8).contains(&left) && (1..6).contains(&top), "{}", run.messages);
-    assert!((9..=16).contains(&right) && (7..=12).contains(&bottom), "{}", run.messages);
+    // Pixels count from the corner of the film.
+    assert_eq!(bounds(&[]), bounds(&["--crop", "3,3,16,12"]));
 }
 
 /// A gigabyte of zeros as the colour profile of a PNG image, under a limit of 700 MB: each thread takes some.

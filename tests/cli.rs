@@ -161,6 +161,9 @@ fn comparison_prints_the_metrics_and_fails_over_a_threshold() {
     assert!((mse - 0.01).abs() < 1e-6, "the squared error of 1.1 against 1 is 0.01, found {mse}");
     let run = folder.run(&["compare", "b.exr", "a.exr", "--fail-above", "mse=0.009"]);
     run.assert(3, &["error: mse is ", "above the threshold 0.009"]);
+    let below = |value: &str| folder.run(&["compare", "b.exr", "a.exr", "--fail-below", value]);
+    below("mse=0.009").assert(0, &[]);
+    below("mse=0.02").assert(3, &["error: mse is ", "below the threshold 0.02"]);
 }
 
 #[test]

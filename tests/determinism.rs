@@ -8,7 +8,7 @@ use fenestra::{
     pass::{PathLists, Roulette},
     sampler::{Parameters, Sampler},
     scene::{Filter, Lamp, Scene, lamp::LampKind},
-    session::{Event, Flag, Observer, Rules, Session, Settings, StopReason},
+    session::{Event, Flag, Limit, Observer, Rules, Session, Settings, StopReason},
 };
 use glam::Vec3;
 
@@ -282,6 +282,19 @@ fn an_interrupt_comes_before_all_else_that_is_due() {
     let rules = Rules { checkpoints, error: Some(0.0), ..Rules::default() };
     assert_eq!(session.run(&rules, &mut Impatient).unwrap(), StopReason::Interrupt);
     assert!(session.renderer.sample_count() > 0 && !path.exists());
+}
+
+/// The error falls with the root of the samples: at twice the error asked for, a quarter is done.
+#[test]
+fn a_run_by_error_tells_how_far_it_is() {
+    let _alone = support::alone();
+    let mut session = Session::new(support::device(), &scene(), settings(Sampler::Mis)).unwrap();
+    let rules = |error, samples| Rules { error, samples: Some(samples), ..Rules::default() };
+    session.run(&rules(Some(1e-9), 4), &mut |_: &Event<'_>| ()).unwrap();
+    let error = session.standing(&rules(Some(1e-9), 4)).relative_error.unwrap();
+    let standing = session.standing(&Rules { error: Some(0.5 * error), ..Rules::default() });
+    assert!((standing.fraction - 0.25).abs() < 1e-9, "{standing:?}");
+    assert!(matches!(standing.limit, Some(Limit::Error(_))));
 }
 
 /// In a room with lamps, panes, mirrors and sheets, and with roulette, so that paths end for every reason.

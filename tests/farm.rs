@@ -69,4 +69,12 @@ fn tasks_of_a_farm_give_the_bits_of_one_process() {
     assert!(farm.channels["R"].iter().any(|value| *value > 0.0));
     assert_eq!((farm.width, farm.height), (24, 15));
     assert!(farm.channels == whole.channels, "the bits of one process");
+    // Channels of some bands alone cannot be joined.
+    for path in names(0).map(|name| folder.path().join(name)) {
+        let mut band = Image::read_exr(&path).unwrap();
+        band.channels.insert("Z".to_owned(), vec![1.0; band.pixel_count()]);
+        band.write_exr(&path).unwrap();
+    }
+    let run = folder.run(&[&["merge", "-q", "-o", "farm.exr"], &parts[..]].concat());
+    run.assert(0, &["not every part has channels Z; left out"]);
 }

@@ -61,5 +61,9 @@ mod tests {
         assert!(is_judged(4.0, Some(1.0)) && !is_judged(3.9, Some(1.0)));
         assert!(is_judged(1e-9, None) && !is_judged(0.0, None) && !is_judged(-1.0, None));
         assert!(!is_judged(f64::NAN, Some(1.0)));
+        let errors = |relmse, relmse_trimmed| PartErrors { mse: 0.0, relmse, relmse_trimmed };
+        let own = OwnParts { surfaces: Some(errors(1.0, 0.1)), ..OwnParts::default() };
+        assert!(own.judges(&errors(4.0, 0.5)));
+        assert!(!own.judges(&errors(4.0, 0.3)) && !own.judges(&errors(3.0, 0.5)));
     }
 }

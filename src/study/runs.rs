@@ -289,11 +289,28 @@ mod tests {
         };
         assert!(there.differences(&there.clone()).is_empty());
         let parameters = BTreeMap::from([("candidates".to_owned(), "8".to_owned())]);
-        let asked = Conditions { shadow_rays: 4, parameters, ..there.clone() };
+        let asked = Conditions {
+            version: "2".into(),
+            scene_hash: "9876543210fedcba".into(),
+            film: [4, 3],
+            device: "GPU".into(),
+            driver: "new".into(),
+            shadow_rays: 4,
+            depth: 2,
+            reference: "whole".into(),
+            parameters,
+        };
         assert_eq!(
             there.differences(&asked),
             [
+                "version:  there, 2 asked for",
+                "scene hash: 0123456789ab there, 9876543210fe asked for",
+                "film: 0x0 there, 4x3 asked for",
+                "device:  there, GPU asked for",
+                "driver:  there, new asked for",
                 "shadow rays: 5 there, 4 asked for",
+                "depth: 0 there, 2 asked for",
+                "reference:  there, whole asked for",
                 "parameters: default there, candidates=8 asked for"
             ]
         );

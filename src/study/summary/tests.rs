@@ -4,7 +4,7 @@
 use super::*;
 use crate::session::Figures;
 use crate::study::{
-    own_errors::OwnErrors,
+    own_errors::{OwnErrors, OwnParts},
     plan::{Description, Options},
     runs::Conditions,
 };
@@ -120,6 +120,10 @@ fn independent_samples_have_a_slope_of_minus_one_half() {
             assert!((rmse.low * rmse.high / rmse.middle.powi(2) - 1.0).abs() < 1e-9, "{rmse:?}");
         }
     }
+    // Runs by time are no part of a curve where there are some by samples.
+    let by_time = Run { rule: Rule::Seconds(0.4), ..run("mis", 1, 80.0) };
+    let mixed = [runs(), vec![by_time]].concat();
+    assert_eq!(curves(&plan(), &[scene(0.01)], &mixed), all);
     // 12/n falls below 4·0.8 after the second point.
     let judged = &curves(&plan(), &[scene(0.8)], &runs())[0];
     assert_eq!(judged.points.len(), 2);
@@ -143,6 +147,19 @@ fn errors_on_surfaces_have_their_own_ratio_and_curve() {
     let ris = own.iter().find(|s| s.sampler == "ris" && s.rule == Rule::Spp(4)).unwrap();
     assert!((ris.surfaces_ratio.unwrap().middle - 0.25).abs() < 1e-12);
     assert!(ris.parts.environment.is_none() && ris.flip.is_none());
+    // At 4 samples those of `mis` have 0.25, which drowns, and those of `ris` a quarter.
+    let ratio = |scale: f64| {
+        let mut runs = runs.clone();
+        for run in runs.iter_mut().filter(|run| run.sampler == "ris") {
+            run.measurements[2].parts.surfaces.as_mut().unwrap().relmse_trimmed *= scale;
+        }
+        let surfaces = Some(PartErrors { relmse_trimmed: 0.07, ..PartErrors::default() });
+        let parts = Some(OwnParts { surfaces, ..OwnParts::default() });
+        let own = summaries(&plan(), &[StudiedScene { parts, ..scene(1e-9) }], &runs);
+        (own[3].parts.surfaces_judged, own[3].surfaces_ratio)
+    };
+    assert_eq!(ratio(1.0), (false, None));
+    assert_eq!(ratio(100.0), (true, None));
     let curves = curves(&plan(), &[scene(1e-9)], &runs);
     let point = curves[1].points[2];
     assert!((point.relmse.unwrap().middle - 0.0625).abs() < 1e-12);
