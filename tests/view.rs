@@ -64,7 +64,7 @@ fn the_window_shows_what_render_writes() {
     let server = Server::start();
     let options = ["--sampler", "mis", "--depth", "2", "--spp", "8", "--validate"];
     let mut view = View::open(&server, &folder, "yard.toml", &options, SIZE);
-    view.wait_for("mis 8 spp");
+    view.wait_at_rest("mis 8 spp");
     let expected = rendered(&folder, "yard.toml", "8", &[]);
     assert!(difference(&view.picture(SIZE), &expected) <= 1, "the picture at rest");
 
@@ -90,8 +90,7 @@ fn the_window_shows_what_render_writes() {
     view.wait_for("moving");
     std::thread::sleep(std::time::Duration::from_millis(1000));
     view.release("d");
-    view.wait_for("mis 8 spp");
-    view.wait_until(|view| !view.title().contains("moving"));
+    view.wait_at_rest("mis 8 spp");
     view.tap("p");
     view.wait_for_file("yard.view-2.toml");
     let camera = std::fs::read_to_string(folder.path().join("yard.view-2.toml")).unwrap();
@@ -160,7 +159,7 @@ fn samplers_layers_and_insets_can_be_looked_at() {
     let server = Server::start();
     let options = ["--depth", "2", "--spp", "4", "--validate", "--set", "candidates=1"];
     let mut view = View::open(&server, &folder, "room.toml", &options, SIZE);
-    view.wait_for("guided 4 spp");
+    view.wait_at_rest("guided 4 spp");
     // The display may show the picture a little after the title.
     std::thread::sleep(std::time::Duration::from_millis(300));
     let picture = view.picture(SIZE);
@@ -173,16 +172,16 @@ fn samplers_layers_and_insets_can_be_looked_at() {
     view.tap("l");
     view.wait_until(|view| view.picture(SIZE) == picture);
     view.tap("x");
-    view.wait_for("guided 4 spp");
-    view.wait_for("mis 4 spp");
+    view.wait_at_rest("guided 4 spp");
+    view.wait_at_rest("mis 4 spp");
     let line = SIZE[0] as usize / 2;
     view.wait_until(|view| view.picture(SIZE)[line] == [255; 3]);
     view.tap("z");
     view.tap("4");
-    view.wait_for("env 4 spp");
+    view.wait_at_rest("env 4 spp");
     view.tap("]");
     view.wait_for("depth 3");
-    view.wait_for("env 4 spp");
+    view.wait_at_rest("env 4 spp");
     // The inset lies in the corner, once the window has room for it.
     view.resize([640, 480]);
     let corner = 479 * 640 + 639;
@@ -226,7 +225,7 @@ fn controls_change_what_they_say() {
     let server = Server::start();
     let options = ["--sampler", "mis", "--depth", "2", "--spp", "8", "--validate"];
     let mut view = View::open(&server, &folder, "yard.toml", &options, SIZE);
-    view.wait_for("mis 8 spp");
+    view.wait_at_rest("mis 8 spp");
     view.resize(WIDE);
     let at = |view: &View<'_>, [x, y]: [usize; 2]| view.picture(WIDE).get(660 * y + x).copied();
     // Columns right of the panel, where the film is.
@@ -256,7 +255,7 @@ fn controls_change_what_they_say() {
     bookmark(&mut view, &folder, |camera| camera != first);
     view.click([60, 171]);
     let blurred = bookmark(&mut view, &folder, |camera| camera.contains("aperture_radius"));
-    view.wait_until(|view| !view.title().contains("moving") && view.title().contains(" 8 spp"));
+    view.wait_at_rest(" 8 spp");
     view.click([455, 300]);
     let distance = |camera: &str| -> Option<f64> {
         camera.parse::<toml::Table>().unwrap()["camera"].get("focus_distance")?.as_float()
@@ -270,7 +269,7 @@ fn controls_change_what_they_say() {
     assert_eq!(bookmark(&mut view, &folder, |_| true), focused);
     view.click([188, 219]);
     bookmark(&mut view, &folder, |camera| camera == first);
-    view.wait_until(|view| !view.title().contains("moving") && view.title().contains(" 8 spp"));
+    view.wait_at_rest(" 8 spp");
 
     let ask = |view: &View<'_>| {
         view.press("Shift");
@@ -321,7 +320,7 @@ fn a_surface_that_is_lost_is_made_again() {
             faulty_layer::insert(command, &[("FAULTY_PRESENT", present)]);
         };
         let mut view = View::open_with(&server, &folder, "yard.toml", &options, SIZE, lose);
-        view.wait_for("mis 8 spp");
+        view.wait_at_rest("mis 8 spp");
         view.wait_until(|view| difference(&view.picture(SIZE), &expected) <= 1);
         view.tap("Escape");
         view.end().assert(0, &["the layer loses the surface"]);

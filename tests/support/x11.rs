@@ -164,6 +164,17 @@ impl<'a> View<'a> {
         }
     }
 
+    /// Waits until the title contains `text` and the camera rests: a small film of one that moves soon has
+    /// as many samples.
+    #[track_caller]
+    pub fn wait_at_rest(&mut self, text: &str) {
+        let start = Instant::now();
+        let is_met = |title: &str| title.contains(text) && !title.contains("moving");
+        while !is_met(&self.title()) {
+            self.assert_running(start, text);
+        }
+    }
+
     /// Waits until a file is there.
     #[track_caller]
     pub fn wait_for_file(&mut self, name: &str) {
