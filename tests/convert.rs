@@ -58,6 +58,8 @@ fn pictures_have_exposure_curve_part_and_layer() {
     let [red, _, blue] = bytes(&folder, "auto.png").2[0];
     // The luminance 0.31 of the pixel becomes 0.18.
     assert!(red < plain[0][0] && blue == 255, "{red} {blue}");
+    run(&["brighter.png", "--auto-exposure", "--exposure", "1", "--crop", "1,1,2,2"]);
+    assert!(bytes(&folder, "brighter.png").2[0][0] > red, "a stop beside the automatic ones");
 }
 
 #[test]

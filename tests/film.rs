@@ -338,6 +338,8 @@ fn sample_ranges_overlap_only_within_a_seed() {
     let mut joined = metadata(&[range(1, 64, 64)]);
     joined.add_ranges(&metadata(&[range(1, 0, 64), range(2, 128, 1)]));
     assert_eq!(joined.sample_ranges, [range(1, 0, 128), range(2, 128, 1)]);
+    joined.add_ranges(&metadata(&[range(1, 128, 8), range(2, 0, 128)]));
+    assert_eq!(joined.sample_ranges, [range(1, 0, 136), range(2, 0, 129)]);
 }
 
 #[test]

@@ -254,8 +254,13 @@ fn controls_change_what_they_say() {
     view.click([110, 151]);
     bookmark(&mut view, &folder, |camera| camera != first);
     view.click([60, 171]);
-    let blurred = bookmark(&mut view, &folder, |camera| camera.contains("aperture_radius"));
+    bookmark(&mut view, &folder, |camera| camera.contains("aperture_radius"));
     view.wait_at_rest(" 8 spp");
+    let sharp = film(&view);
+    view.click([60, 191]);
+    view.wait_until(|view| film(view) != sharp);
+    view.wait_at_rest(" 8 spp");
+    let blurred = bookmark(&mut view, &folder, |camera| camera.contains("focus_distance"));
     view.click([455, 300]);
     let distance = |camera: &str| -> Option<f64> {
         camera.parse::<toml::Table>().unwrap()["camera"].get("focus_distance")?.as_float()

@@ -98,3 +98,36 @@ pub(crate) fn check_film(image: &Image, path: &Path) -> Result<()> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_that_are_not_finite_take_the_mean_of_their_neighbours() {
+        let mut pixels =
+            [1.0, 2.0, 3.0, 4.0, f32::NAN, 6.0, 7.0, 8.0, 18.0].map(|value| [value; 3]);
+        assert_eq!(repair(&mut pixels, 3), 1);
+        assert!((pixels[4][1] - 49.0 / 8.0).abs() < 1e-5, "{pixels:?}");
+        let mut corners = [[f32::INFINITY; 3], [2.0; 3], [4.0; 3], [f32::NAN; 3]];
+        assert_eq!(
+            (repair(&mut corners, 2), corners),
+            (2, [[3.0; 3], [2.0; 3], [4.0; 3], [3.0; 3]])
+        );
+        assert_eq!((repair(&mut [[f32::NAN; 3]; 4], 2)), 4);
+    }
+
+    /// Its channels have no Cryptomatte, so neither have its attributes.
+    #[test]
+    fn denoised_pictures_are_marked_and_describe_no_layers() {
+        let mut film = Image::new(1, 1);
+        for name in [&format!("{}0a1b2c3/name", cryptomatte::PREFIX), "fenestra.scene"] {
+            film.attributes.insert(name.to_owned(), Attribute::Text("room".into()));
+        }
+        let image = image_of(&film, &[[1.0; 3]], "filter".into());
+        let names: Vec<&str> = image.attributes.keys().map(String::as_str).collect();
+        assert_eq!(names, [DENOISED, "fenestra.scene"]);
+        assert!(check_film(&image, Path::new("a.exr")).is_err());
+        assert!(check_film(&film, Path::new("a.exr")).is_ok());
+    }
+}

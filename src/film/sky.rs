@@ -92,6 +92,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_share_of_the_values_is_above_white() {
+        let values: Vec<f32> = (1..=1000_u16).rev().map(f32::from).collect();
+        assert!((white(values.clone(), CLIPPED) - 995.5).abs() < 1.0);
+        assert_eq!(white([vec![0.0; 1000], values[..1].to_vec()].concat(), CLIPPED), 1000.0);
+    }
+
+    #[test]
     fn the_sky_is_bright_above_and_dark_below_the_horizon() {
         let white = Sky::new(64, Vec3::Y, 2.0, |_| Vec3::splat(2.0));
         let pixel = |sky: &Sky, row: usize| sky.pixels()[64 * row + 20];
