@@ -9,7 +9,7 @@ use bytemuck::{Pod, Zeroable};
 use fenestra::{
     math::random::random_independent_2d,
     sampler::{
-        Parameters, Sampler,
+        Sampler,
         control_variates::{ControlVariatesParameters, RecordGrid},
     },
     scene::Scene,
@@ -25,12 +25,7 @@ use fenestra::{
 use glam::{DVec3, Vec3, vec3};
 
 use crate::{
-    support::{
-        self, render,
-        replicates::{self, LIMIT},
-        scenes,
-        statistics::Comparison,
-    },
+    support::{self, render, replicates, scenes},
     twin::control_variates::{Candidate, Controlled, choose, control_of, entry, record_of},
 };
 
@@ -221,10 +216,7 @@ fn a_record_expects_what_it_has_counted_or_what_all_have() {
 }
 
 fn settings(assignments: &[&str]) -> Settings {
-    let mut parameters = Parameters::default();
-    for assignment in assignments {
-        parameters.set(assignment).unwrap();
-    }
+    let parameters = support::parameters(assignments);
     Settings { sampler: Sampler::ControlVariates, parameters, ..Settings::default() }
 }
 
@@ -248,12 +240,7 @@ fn parameters_change_no_image() {
     for (case, assignments) in cases.into_iter().enumerate() {
         let seed = 100 * (1 + case as u32);
         let values = replicates::replicates(&scene, &settings(assignments), seed, 8);
-        let Comparison { largest_t, ratio, largest_t_with_bias } =
-            Comparison::new(&values, &reference);
-        eprintln!("{assignments:?}: largest |t| {largest_t:.2}, ratio {ratio:.4}");
-        assert!(largest_t < LIMIT, "{assignments:?}: |t| = {largest_t}");
-        let is_judged = largest_t_with_bias > LIMIT || (ratio - 1.0).abs() < 0.03;
-        assert!(is_judged, "{assignments:?}: too noisy to judge");
+        replicates::assert_same(&format!("{assignments:?}"), &values, &reference, 0.03);
     }
 }
 

@@ -35,10 +35,8 @@ use half::f16;
 
 use crate::{
     support::{
-        self, materials,
-        replicates::{self, LIMIT},
-        scenes,
-        statistics::{Comparison, chi_square_p_value, z_of_mean},
+        self, materials, replicates, scenes,
+        statistics::{chi_square_p_value, z_of_mean},
     },
     twin::haar::{Product, node_reflectance},
 };
@@ -124,14 +122,6 @@ fn scene() -> Scene {
     ])
 }
 
-fn parameters(assignments: &[&str]) -> Parameters {
-    let mut parameters = Parameters::default();
-    for assignment in assignments {
-        parameters.set(assignment).unwrap();
-    }
-    parameters
-}
-
 /// Passes and buffers around one wave of paths, one per surface.
 struct Paths {
     surfaces: Vec<Surface>,
@@ -148,7 +138,7 @@ struct Paths {
 impl Paths {
     /// Makes paths with their product and an empty cache.
     fn new(assignments: &[&str]) -> Self {
-        let (device, parameters) = (support::device(), parameters(assignments));
+        let (device, parameters) = (support::device(), support::parameters(assignments));
         let (scene, surfaces) = (scene(), surfaces());
         let buffers =
             SceneBuffers::new(device, &scene, window_of(&Settings::default(), &scene)).unwrap();
@@ -203,14 +193,7 @@ impl Paths {
                 is_visible: u32::from(*is_visible),
             })
             .collect();
-        let device = support::device();
-        let input = Buffer::from_slice(device, "paths", &inputs).unwrap();
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
-        let pipeline = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
-        let film = DescriptorSet::new(device, &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
-        let mut commands = Commands::begin(device).unwrap();
-        commands.dispatch(&pipeline, &[self.waves.set(), &film], &[], inputs.len() as u32);
-        commands.submit_and_wait().unwrap();
+        support::PathInput::put(&inputs, &self.waves);
     }
 
     /// Teaches the caches the outcome of one shadow ray per path.
@@ -477,7 +460,7 @@ fn pictures_with_other_parameters_agree() {
         scenes::plastic(0.3),
     ]);
     let settings = |sampler, assignments: &[&str]| {
-        let parameters = parameters(assignments);
+        let parameters = support::parameters(assignments);
         Settings { sampler, depth: 2, parameters, ..Settings::default() }
     };
     let reference = replicates::replicates(&scene, &settings(Sampler::Mis, &[]), 4000, 32);
@@ -486,9 +469,6 @@ fn pictures_with_other_parameters_agree() {
         &["haar-cache=on", "environment-share=0", "k=4", "tau=2"],
     ] {
         let values = replicates::replicates(&scene, &settings(Sampler::Haar, assignments), 9000, 8);
-        let compared = Comparison::new(&values, &reference);
-        eprintln!("{assignments:?}: {compared:?}");
-        assert!(compared.largest_t < LIMIT, "{assignments:?}: {compared:?}");
-        assert!(compared.largest_t_with_bias > LIMIT, "{assignments:?}: too noisy to judge");
+        replicates::assert_same(&format!("{assignments:?}"), &values, &reference, 0.0);
     }
 }

@@ -28,9 +28,8 @@ use crate::{
         self,
         random::Random,
         rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, soup, sphere},
-        replicates::{LIMIT, replicates},
+        replicates::{assert_same, replicates},
         scenes,
-        statistics::Comparison,
     },
     twin::surface::{surface_at, triangle_material},
 };
@@ -439,11 +438,7 @@ fn repeated_meshes_become_instances_that_look_like_copies() {
     let settings = Settings { sampler: Sampler::Mis, depth: 3, ..Settings::default() };
     let reference = replicates(&flat, &settings, 100, 4);
     let values = replicates(&instanced, &settings, 200, 4);
-    let Comparison { largest_t, ratio, largest_t_with_bias } = Comparison::new(&values, &reference);
-    eprintln!("largest |t| {largest_t:.2}, ratio {ratio:.4}, with bias {largest_t_with_bias:.1}");
-    assert!(largest_t < LIMIT, "|t| = {largest_t}");
-    // The test has teeth: an error of a tenth would not pass.
-    assert!(largest_t_with_bias > LIMIT, "too noisy to judge: {largest_t_with_bias}");
+    assert_same("instances", &values, &reference, 0.0);
 }
 
 #[test]

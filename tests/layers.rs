@@ -25,14 +25,10 @@ use crate::support::{self, guide::Guide as _, render, renderer, scenes};
 
 /// Returns settings of `visibility` with few lobes, `assignments` and the layer of its caches.
 fn visibility(assignments: &[&str]) -> Settings {
-    let mut parameters = Parameters::default();
     let few = ["environment-lobes=24", "brdf-lobes=4", "views=8", "lobes=24"];
-    for assignment in few.iter().chain(assignments) {
-        parameters.set(assignment).unwrap();
-    }
     Settings {
         sampler: Sampler::Visibility,
-        parameters,
+        parameters: support::parameters(&[&few, assignments].concat()),
         aovs: vec![Aov::CacheEntries],
         ..Settings::default()
     }

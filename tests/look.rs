@@ -13,9 +13,9 @@ use glam::Vec3;
 use crate::support::{
     self,
     guide::Guide as _,
-    replicates::{BLOCK, LIMIT, REPLICATES, replicates, rows},
+    replicates::{BLOCK, REPLICATES, assert_same, replicates, rows},
     scenes,
-    statistics::{Comparison, estimates},
+    statistics::estimates,
 };
 
 /// Camera at the other side of the room.
@@ -122,8 +122,5 @@ fn pictures_after_a_motion_are_unbiased() {
         renderer.render_pass(2).unwrap();
         renderer.look(&scene.camera, [32, 24], seed + 3000, true).unwrap();
     });
-    let compared = Comparison::new(&estimates(&values), &reference);
-    eprintln!("largest |t| {:.2}, mean ratio {:.4}", compared.largest_t, compared.ratio);
-    assert!(compared.largest_t < LIMIT, "|t| = {}", compared.largest_t);
-    assert!(compared.largest_t_with_bias > LIMIT || (compared.ratio - 1.0).abs() < 0.03);
+    assert_same("after a motion", &estimates(&values), &reference, 0.03);
 }

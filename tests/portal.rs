@@ -6,7 +6,7 @@ use std::{fs, path::Path};
 
 use fenestra::{
     math::random::random_independent_1d,
-    sampler::{Parameters, Sampler},
+    sampler::Sampler,
     scene::{Portal, Scene},
     session::Settings,
     shader::bindings::probe,
@@ -14,13 +14,7 @@ use fenestra::{
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use crate::{
-    support::{
-        self,
-        command::Folder,
-        replicates::{self, LIMIT},
-        scenes,
-        statistics::{Comparison, chi_square_p_value},
-    },
+    support::{self, command::Folder, replicates, scenes, statistics::chi_square_p_value},
     twin::{
         random::random_2d,
         spherical_rectangle::{LEAST_UNIFORM_SOLID_ANGLE, SphericalRectangle},
@@ -193,16 +187,12 @@ fn pictures_agree_with_other_samplers() {
         replicates::replicates(scene, &settings, 4000, 128)
     };
     let agrees = |scene: &Scene, depth, share: &str, reference: &[_]| {
-        let mut parameters = Parameters::default();
-        parameters.set(share).unwrap();
+        let parameters = support::parameters(&[share]);
         let settings =
             Settings { sampler: Sampler::Portal, depth, parameters, ..Settings::default() };
         let values = replicates::replicates(scene, &settings, 9000, 32);
-        let compared = Comparison::new(&values, reference);
         let label = format!("{} {share} {}", scene.name, scene.portals.len());
-        eprintln!("{label}: {compared:?}");
-        assert!(compared.largest_t < LIMIT, "{label}: {compared:?}");
-        assert!(compared.largest_t_with_bias > LIMIT, "{label}: too noisy to judge");
+        replicates::assert_same(&label, &values, reference, 0.0);
     };
     let direct = reference_of(&room, 1);
     for (count, share) in [

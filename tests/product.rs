@@ -250,14 +250,7 @@ impl Paths {
                 is_visible: u32::from(*is_visible),
             })
             .collect();
-        let device = support::device();
-        let input = Buffer::from_slice(device, "paths", &inputs).unwrap();
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
-        let pipeline = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
-        let film = DescriptorSet::new(device, &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
-        let mut commands = Commands::begin(device).unwrap();
-        commands.dispatch(&pipeline, &[self.waves.set(), &film], &[], inputs.len() as u32);
-        commands.submit_and_wait().unwrap();
+        support::PathInput::put(&inputs, &self.waves);
     }
 
     /// Teaches the caches the outcome of one shadow ray per path.

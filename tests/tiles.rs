@@ -15,7 +15,7 @@ use fenestra::{
     math::{equal_area::direction_from_square, frame::frame_from_normal, random::hash_4d},
     pass::{Pass, PathDemand, SceneBuffers, Steps, Surfaces, WaveBuffers},
     sampler::{
-        Parameters, Sampler,
+        Sampler,
         pilot::Tables,
         rays::RaySteps,
         regions::Partition,
@@ -38,10 +38,8 @@ use crate::{
     support::{
         self,
         hemisphere::{self, BINS},
-        materials, render,
-        replicates::{self, LIMIT},
-        scenes,
-        statistics::{Comparison, chi_square_p_value},
+        materials, render, replicates, scenes,
+        statistics::chi_square_p_value,
     },
     twin::{
         brdf,
@@ -488,10 +486,7 @@ fn rays_follow_the_density_that_they_are_divided_by() {
 }
 
 fn settings(assignments: &[&str], depth: u32) -> Settings {
-    let mut parameters = Parameters::default();
-    for assignment in assignments {
-        parameters.set(assignment).unwrap();
-    }
+    let parameters = support::parameters(assignments);
     Settings { sampler: Sampler::Tiles, parameters, depth, ..Settings::default() }
 }
 
@@ -514,12 +509,7 @@ fn parameters_change_no_image() {
     for (case, assignments) in cases.into_iter().enumerate() {
         let seed = 100 * (1 + case as u32);
         let values = replicates::replicates(&scene, &settings(assignments, 1), seed, 8);
-        let Comparison { largest_t, ratio, largest_t_with_bias } =
-            Comparison::new(&values, &reference);
-        eprintln!("{assignments:?}: largest |t| {largest_t:.2}, ratio {ratio:.4}");
-        assert!(largest_t < LIMIT, "{assignments:?}: |t| = {largest_t}");
-        let is_judged = largest_t_with_bias > LIMIT || (ratio - 1.0).abs() < 0.03;
-        assert!(is_judged, "{assignments:?}: too noisy to judge");
+        replicates::assert_same(&format!("{assignments:?}"), &values, &reference, 0.03);
     }
 }
 

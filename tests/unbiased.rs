@@ -12,7 +12,7 @@
 use std::{env, path::Path, sync::Arc};
 
 use fenestra::{
-    sampler::{Parameters, Sampler},
+    sampler::Sampler,
     scene::{
         Scene,
         material::{Material, MaterialKind},
@@ -57,10 +57,7 @@ fn replicates(scene: &Scene, settings: &Settings, samples: u32) -> Vec<Estimate>
 /// quarter of its views cost `product` and `visibility` little noise, and save most of the time of fits; a
 /// hit still has four times the products that it keeps.
 fn samplers_agree(scene: &Scene, depth: u32, samples: u32, samplers: &[Sampler]) {
-    let mut parameters = Parameters::default();
-    for assignment in ["environment-lobes=32", "brdf-lobes=8", "views=8"] {
-        parameters.set(assignment).unwrap();
-    }
+    let parameters = support::parameters(&["environment-lobes=32", "brdf-lobes=8", "views=8"]);
     let settings = |sampler: &Sampler| Settings {
         sampler: *sampler,
         parameters,
@@ -169,10 +166,7 @@ fn in_a_glazed_room_with_lamps() {
 /// `cosine`, then `mis` with and without compensation and with one and five shadow rays, then `guided`.
 fn ways_to_weigh_the_bounce_ray(depth: u32) -> Vec<Settings> {
     let with = |sampler, shadow_rays, assignments: &[&str]| {
-        let mut parameters = Parameters::default();
-        for assignment in assignments {
-            parameters.set(assignment).unwrap();
-        }
+        let parameters = support::parameters(assignments);
         Settings { sampler, parameters, depth, shadow_rays, ..Settings::default() }
     };
     vec![

@@ -29,11 +29,12 @@ use bytemuck::{Pod, Zeroable};
 use fenestra::{
     film::Sums,
     gpu::{Buffer, Commands, DescriptorSet, Device, Pipeline},
-    pass::Totals,
+    pass::{Totals, WaveBuffers},
+    sampler::Parameters,
     scene::Scene,
     session::{Renderer, Settings},
     shader::{
-        bindings::{Binding, probe},
+        bindings::{Binding, PROBE, probe},
         constants::WORKGROUP_SIZE,
         rooms,
     },
@@ -46,6 +47,13 @@ pub fn alone() -> MutexGuard<'static, ()> {
     IN_USE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Parameters after assignments as those of `--set`.
+pub fn parameters(assignments: &[&str]) -> Parameters {
+    let mut parameters = Parameters::default();
+    assignments.iter().for_each(|assignment| parameters.set(assignment).unwrap());
+    parameters
+}
+
 /// Input of the probe `product_state` for one path: a surface seen along a direction, and a shadow
 /// ray with its outcome.
 #[repr(C)]
@@ -56,6 +64,19 @@ pub struct PathInput {
     pub outgoing: [f32; 3],
     pub shadow_direction: [f32; 3],
     pub is_visible: u32,
+}
+
+impl PathInput {
+    /// Writes ray, hit, and a shadow ray with its outcome for every path of a wave.
+    pub fn put(inputs: &[Self], waves: &WaveBuffers) {
+        let input = Buffer::from_slice(device(), "paths", inputs).unwrap();
+        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
+        let pipeline = Pipeline::new(device(), "product_state", spirv, &[]).unwrap();
+        let film = DescriptorSet::new(device(), &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
+        let mut commands = Commands::begin(device()).unwrap();
+        commands.dispatch(&pipeline, &[waves.set(), &film], &[], inputs.len() as u32);
+        commands.submit_and_wait().unwrap();
+    }
 }
 
 /// Returns the device of the tests, with validation and synchronization validation on.

@@ -8,7 +8,7 @@ use fenestra::{
     session::{Renderer, Settings},
 };
 
-use super::statistics::{Estimate, estimates};
+use super::statistics::{Comparison, Estimate, estimates};
 
 /// Replicates on either side of a comparison.
 pub const REPLICATES: u32 = 8;
@@ -67,4 +67,15 @@ pub fn replicates(
 ) -> Vec<Estimate> {
     let seeds = first_seed..first_seed + REPLICATES;
     estimates(&rows(scene, settings, seeds, samples, BLOCK, |_| {}))
+}
+
+/// Fails if estimates differ from those of a reference, or if too much noise hides an error of a tenth and
+/// their sums differ by more than `tolerance` of the reference's.
+pub fn assert_same(name: &str, values: &[Estimate], reference: &[Estimate], tolerance: f64) {
+    let compared = Comparison::new(values, reference);
+    eprintln!("{name}: {compared:?}");
+    assert!(compared.largest_t < LIMIT, "{name}: {compared:?}");
+    let is_judged =
+        compared.largest_t_with_bias > LIMIT || (compared.ratio - 1.0).abs() < tolerance;
+    assert!(is_judged, "{name}: too noisy to judge, {compared:?}");
 }
