@@ -220,6 +220,7 @@ fn everything_that_an_obj_file_loses_is_named_once() {
     );
     let text = "mtllib room.mtl\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0\nvt 0 0\ng a\ns 1\nf 1 2 3\n\
         usemtl leaf\nf 1/1 2/1 3/1\nusemtl paint\nf 1 2 3\nusemtl lost\nf 3 2 1\nl 1 2\ncstype bezier\n";
+    image::GrayImage::new(2, 2).save(folder.path().join("leaf.png")).unwrap();
     let path = folder.write("room.obj", text);
     let scene = Scene::load(&path).unwrap();
     let found = warnings(&scene);
@@ -232,7 +233,7 @@ fn everything_that_an_obj_file_loses_is_named_once() {
          that looks at it",
         "2 triangles lie on others of another material that look the same way; either is seen, by \
          chance",
-        "ignored `bump`, `map_bump` (material `leaf`, room.mtl:6): height maps",
+        "ignored heights in `bump`, `map_bump` (material `leaf`, room.mtl:6): their unit is open",
         "ignored `Tf` other than white (material `leaf`): of all but thin panes",
         "ignored `illum 10` (material `paint`, room.mtl:13)",
         "ignored `map_Ks` (material `paint`, room.mtl:14)",
@@ -255,7 +256,10 @@ fn everything_that_an_obj_file_loses_is_named_once() {
 
     // The program prints each, and refuses them all under --strict.
     let run = folder.run(&["render", "room.obj", "--strict", "-o", "room.exr"]);
-    run.assert(1, &["room.obj: --strict: 17 warnings:\n", "`bump`, `map_bump` (material `leaf`"]);
+    run.assert(
+        1,
+        &["room.obj: --strict: 17 warnings:\n", "heights in `bump`, `map_bump` (material `leaf`"],
+    );
     folder.run(&["study", "room.obj", "--strict"]).assert(1, &["--strict: 17 warnings:"]);
     folder.run(&["info", "room.obj"]).assert(0, &[]);
 }

@@ -74,7 +74,7 @@ features! {
     MTL_KS_COLOR "colour and strength of `Ks`" "Fresnel's equations give the gloss of plastic";
     MTL_ILLUM_MODEL "other models of `illum`" "as 2";
     MTL_OPTION "other options of images, by name" "";
-    MTL_BUMP "`bump`, `map_bump`" "height maps";
+    MTL_BUMP "heights in `bump`, `map_bump`" "their unit is open";
     MTL_KA "`Ka` other than black" "";
     MTL_TF "`Tf` other than white" "of all but thin panes";
     MTL_OUTSIDE "images whose names are absolute or lead out of the folder of the scene"
@@ -107,7 +107,7 @@ features! {
     PBRT_ASPECT "`frameaspectratio` other than that of the film" "pixels are square";
     PBRT_CURVE "exact form of `curve`" "tubes of 3 to 6 sides";
     PBRT_PARTIAL "`phimax`, `zmin`, `zmax`, by shape" "quadrics are whole";
-    PBRT_DISPLACEMENT "`displacement`" "";
+    PBRT_DISPLACEMENT "`displacement` of shapes, or beside a `normalmap`" "left out";
     PBRT_FLAT "shapes whose transformation flattens space" "left out";
     PBRT_COATED_CONDUCTOR "coat of `coatedconductor`" "rendered as the bare conductor";
     PBRT_TRANSMISSION "light through `diffusetransmission`" "rendered as diffuse reflection";
@@ -155,7 +155,7 @@ features! {
         "one lobe of the mean roughness; images on other coordinates than the first count by their means";
     MI_BLEND "the lesser part of `blendbsdf` and `mixturebsdf` with glass"
         "the other one is the whole surface";
-    MI_BUMP_MAP "`bumpmap`" "";
+    MI_BUMP_MAP "`bumpmap` of vertex colours, or beside a `normalmap`" "left out";
     MI_BECKMANN "distribution `beckmann`" "`ggx` of the same α";
     MI_ANISOTROPIC "`alpha_u` and `alpha_v` that differ" "their mean, or `alpha_u`";
     MI_ALPHA_TEXTURE "`alpha` of vertices" "0.1";

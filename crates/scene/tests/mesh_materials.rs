@@ -381,6 +381,15 @@ fn joints_carry_the_vertices_of_a_skin() {
         Attribute("_BINDS", 5126, "MAT4", false, floats(&[shift, twice, twice].concat())),
         Attribute("NORMAL", 5126, "VEC3", false, floats(&[0.6, 0.8, 0.0].repeat(3))),
         Attribute("TANGENT", 5126, "VEC4", false, floats(&[0.8, -0.6, 0.0, -1.0].repeat(3))),
+        // A second set carries the last vertex as much as the first.
+        Attribute("JOINTS_1", 5121, "VEC4", false, vec![0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]),
+        Attribute(
+            "WEIGHTS_1",
+            5126,
+            "VEC4",
+            false,
+            floats(&[0., 0., 0., 0., 0., 0., 0., 0., 0.5, 0., 0., 0.]),
+        ),
     ];
     let skins = r#", "skins": [{"joints": [1, 2], "inverseBindMatrices": 3}]"#;
     let nodes = r#""nodes": [{"mesh": 0, "skin": 0, "translation": [9, 9, 9]},
@@ -391,7 +400,7 @@ fn joints_carry_the_vertices_of_a_skin() {
     let folder = Folder::new();
     let read = |text: String| Mesh::read(&folder.write("a.gltf", text), &mut Vec::new());
     let mesh = read(text.clone()).unwrap();
-    assert_eq!(mesh.positions, [[2.0, 1.0, 0.0], [3.5, 0.5, 2.0], [2.0, 2.0, 0.0]]);
+    assert_eq!(mesh.positions, [[2.0, 1.0, 0.0], [3.5, 0.5, 2.0], [2.0, 3.0, 2.0]]);
     // The second vertex is stretched by 1.5 and by 2.5: its normal still stands on its tangent.
     let unit = |[x, y, z]: [f32; 3]| Vec3::new(x, y, z).normalize();
     assert!(close(unit(mesh.normals[1]), unit([0.6 / 1.5, 0.8 / 2.5, 0.0]).to_array()));
@@ -430,19 +439,22 @@ fn normal_maps_without_tangents_get_them() {
     assert_eq!(read(&[positions(), uvs(), stored], material).tangents[0], [0.0, 1.0, 0.0, -1.0]);
     assert!(read(&[positions(), uvs()], "{}").tangents.is_empty());
 
-    // An OBJ file counts v from below. Two triangles share an edge with its vertices and mirror the
-    // image there, so that the vertices of the edge are repeated.
-    folder.write("a.mtl", "newmtl bumpy\nnorm -bm 0.5 n.png\n");
-    let text = "mtllib a.mtl\nusemtl bumpy\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv -1 0 0\n\
-        vt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/2/1\n";
-    let mesh = Mesh::read(&folder.write("a.obj", text), &mut Vec::new()).unwrap();
-    assert_eq!(mesh.positions.len(), 6);
-    let tangents = |face: usize| mesh.triangles[face].map(|corner| mesh.tangents[corner as usize]);
-    assert_eq!(tangents(0), [[1.0, 0.0, 0.0, 1.0]; 3]);
-    assert_eq!(tangents(1), [[-1.0, 0.0, 0.0, -1.0]; 3]);
-    assert_eq!(mesh.uvs[0].len(), 6);
-    assert_eq!(mesh.normals, [[0.0, 0.0, 1.0]; 6]);
-    assert_eq!(mesh.materials[0].material.surface.normal_scale, 0.5);
+    // An OBJ file counts v from below, and may name normals under the key of heights. Two triangles share
+    // an edge with its vertices and mirror the image there, so that the vertices of the edge are repeated.
+    for key in ["norm", "map_Bump"] {
+        folder.write("a.mtl", format!("newmtl bumpy\n{key} -bm 0.5 n.png\n"));
+        let text = "mtllib a.mtl\nusemtl bumpy\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv -1 0 0\n\
+            vt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/2/1\n";
+        let mesh = Mesh::read(&folder.write("a.obj", text), &mut Vec::new()).unwrap();
+        assert_eq!(mesh.positions.len(), 6);
+        let tangents =
+            |face: usize| mesh.triangles[face].map(|corner| mesh.tangents[corner as usize]);
+        assert_eq!(tangents(0), [[1.0, 0.0, 0.0, 1.0]; 3]);
+        assert_eq!(tangents(1), [[-1.0, 0.0, 0.0, -1.0]; 3]);
+        assert_eq!(mesh.uvs[0].len(), 6);
+        assert_eq!(mesh.normals, [[0.0, 0.0, 1.0]; 6]);
+        assert_eq!(mesh.materials[0].material.surface.normal_scale, 0.5, "{key}");
+    }
 }
 
 #[test]

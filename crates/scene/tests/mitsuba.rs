@@ -12,7 +12,7 @@ use fenestra_scene::{
     material::{ConductorFresnel, Material, MaterialKind, Principled},
     texture::{Encoding, Interpolation, Wrap},
 };
-use glam::Vec3;
+use glam::{Vec2, Vec3, Vec4};
 
 use crate::support::folder::{BALL, Folder, yard};
 
@@ -395,6 +395,49 @@ fn normal_maps_stand_on_the_tangents_of_mitsuba() {
         assert_eq!(normal.encoding, Encoding::Linear);
         assert_eq!(scene.geometry.tangents, [tangent; 4]);
     }
+}
+
+/// The image lies once on a rectangle of 2 × 2 units.
+#[test]
+fn heights_become_normals_along_their_image() {
+    let folder = Folder::new();
+    write_image(&folder, "bumps.png");
+    let image = |name: &str| {
+        format!(
+            "<texture type=\"bitmap\" name=\"{name}\"><boolean name=\"raw\" value=\"true\"/>\
+             <string name=\"filename\" value=\"bumps.png\"/><string name=\"wrap_mode\" \
+             value=\"clamp\"/></texture>"
+        )
+    };
+    let of = |bsdf: String| {
+        let text = format!("{SENSOR}<shape type=\"rectangle\">{bsdf}</shape>");
+        loaded(&folder.write("a.xml", document(&text)))
+    };
+    let bumps = |around: &str, inner: &str| {
+        let float = "<float name=\"scale\" value=\"2\"/>";
+        format!("<bsdf type=\"bumpmap\">{float}{around}{inner}</bsdf>")
+    };
+    let diffuse = "<bsdf type=\"diffuse\"/>";
+    let scene = of(format!("<bsdf type=\"twosided\">{}</bsdf>", bumps(&image("any"), diffuse)));
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    assert!(scene.geometry.tangents.is_empty());
+    let normal = scene.materials[0].surface.normal.as_ref().unwrap();
+    let [red, green, blue, white] = [0.2126_f32, 0.7152, 0.0722, 1.0];
+    for (place, right, up) in
+        [([0.25, 0.25], green - red, red - blue), ([0.75, 0.75], white - blue, green - white)]
+    {
+        let expected = Vec3::new(-right, -up, 1.0).normalize();
+        let found = 2.0 * normal.value(place.into()).truncate() - 1.0;
+        assert!(found.abs_diff_eq(expected, 2e-3), "{found} {expected}");
+    }
+    // One of two maps counts; a constant height is none.
+    let normals = format!("<bsdf type=\"normalmap\">{}{diffuse}</bsdf>", image("normalmap"));
+    let both = of(bumps(&image("any"), &normals));
+    assert!(both.warnings.iter().any(|warning| warning.contains("`bumpmap`")), "{both:?}");
+    let flat = "<texture type=\"checkerboard\"><float name=\"color0\" value=\"0\"/></texture>";
+    let scene = of(bumps(flat, diffuse));
+    let flat = scene.materials[0].surface.normal.as_ref().unwrap().value(Vec2::splat(0.3));
+    assert!(flat.abs_diff_eq(Vec4::new(0.5, 0.5, 1.0, 1.0), 1e-3), "{flat}");
 }
 
 /// An image of 2 × 2 texels: red and green above blue and white.

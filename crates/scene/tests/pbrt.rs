@@ -469,6 +469,13 @@ fn numbers_are_opacity_or_colours_and_roughness_is_mapped() {
     let map = normal.materials[0].surface.normal.clone().unwrap();
     assert_eq!((map.encoding, map.image_from_uv[1]), (Encoding::Linear, [0.0, -1.0, 1.0]));
     assert_eq!(normal.geometry.tangents.len(), 3);
+    // Heights of two texels, the left one higher: those of the channel of opacity.
+    let clamped = format!("{float} \"string wrap\" \"clamp\"");
+    let bumpy = textured(&clamped, r#""diffuse" "texture displacement" "f""#);
+    let map = bumpy.materials[0].surface.normal.clone().unwrap();
+    assert_eq!((map.encoding, map.channels), (Encoding::Linear, Channels::Color));
+    assert!(map.value(Vec2::splat(0.3)).x > 0.6 && bumpy.geometry.tangents.is_empty());
+    assert!(!bumpy.warnings.iter().any(|warning| warning.contains("displacement")));
     // The share of a surface that is not there is what the image leaves: here 1 − (1 − value).
     let thin = textured(
         r#"Texture "f" "float" "imagemap" "string filename" "a.png" "bool invert" true
@@ -583,11 +590,14 @@ fn square_maps_lie_where_pbrt_shows_them() {
         assert!((found - 2.0).abs() < 0.02, "{found}");
         assert!(scene.environment.radiance(Vec3::Y).x < 1e-3);
         assert!((scene.environment.radiance(Vec3::X).y - 0.5).abs() < 1e-3);
-        let world = r#"LightSource "infinite" "string filename" "sky.pfm""#;
+        // Lights of both kinds add up.
+        let world = r#"LightSource "infinite" "string filename" "sky.pfm"
+            LightSource "infinite" "rgb L" [0 0 3]"#;
         let text = format!("{head} WorldBegin {world}");
         let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
         assert!((scene.environment.radiance(turn * Vec3::Z).x - 4.0).abs() < 0.04);
         assert!(scene.environment.radiance(turn * Vec3::NEG_Z).x < 1e-2);
+        assert!((scene.environment.radiance(Vec3::X).z - 3.0).abs() < 1e-3);
     }
 }
 

@@ -1,9 +1,10 @@
 //! Shared by the readers of other formats: the scene that they return, media and illuminants by name,
-//! mixtures of materials, equal-area maps, and the gamut of reflectances.
+//! mixtures of materials, bump maps, equal-area maps, and the gamut of reflectances.
 
 pub(crate) mod blend;
 pub(crate) mod equal_area;
 pub(crate) mod media;
+pub(crate) mod relief;
 
 use std::path::PathBuf;
 

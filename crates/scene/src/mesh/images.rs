@@ -6,7 +6,12 @@ use std::{
     sync::Arc,
 };
 
-use crate::texture::{Texels, Texture, TextureCache};
+use glam::Vec4;
+
+use crate::texture::{Encoding, Texels, Texture, TextureCache};
+
+/// Texels that tell of an image whether it holds normals.
+const TEXELS_LOOKED_AT: usize = 4096;
 
 /// Image files, each read once.
 #[derive(Debug, Default)]
@@ -49,4 +54,17 @@ pub(crate) fn has_alpha(texture: &Texture) -> bool {
         Texels::Shorts(texels) => texels.iter().any(|texel| texel[3] < u16::MAX),
         Texels::Halves(texels) => texels.iter().any(|texel| texel[3].to_f32() < 1.0),
     }
+}
+
+/// Tests for texels that are vectors of about unit length, along +z on the mean, as those of normal maps.
+pub(super) fn holds_normals(texture: &Texture) -> bool {
+    let count = texture.width as usize * texture.height as usize;
+    let step = count.div_ceil(TEXELS_LOOKED_AT);
+    let normals = (0..count).step_by(step).map(|texel| {
+        let texel = Vec4::from(texture.linear_texel(Encoding::Linear, texel)).truncate();
+        let normal = 2.0 * texel - 1.0;
+        normal.extend((normal.length() - 1.0).abs())
+    });
+    let mean = normals.sum::<Vec4>() / count.div_ceil(step) as f32;
+    mean.x.abs().max(mean.y.abs()) < 0.25 && mean.z > 0.5 && mean.w < 0.2
 }

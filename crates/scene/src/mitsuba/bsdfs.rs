@@ -7,7 +7,7 @@ use super::{
     document::Node,
     parameters::Parameters,
     spectra::{self, Role},
-    textures::Value,
+    textures::{MAX_SCALES, Value},
     values,
 };
 use crate::{
@@ -103,13 +103,7 @@ impl Reader {
             "blendbsdf" => self.blend(&parameters)?,
             "mixturebsdf" => self.mixture(&parameters)?,
             "coating" | "roughcoating" => self.coating(&parameters)?,
-            "bumpmap" | "bump" => {
-                self.ignored.add(features::MI_BUMP_MAP, || node.place());
-                let model = self.inner(&parameters)?;
-                parameters.without_effect(&["arbitrary", "scale"]);
-                parameters.objects("texture")?;
-                model
-            }
+            "bumpmap" | "bump" => self.bump_map(&parameters)?,
             "normalmap" => self.normal_map(&parameters)?,
             "null" => Model {
                 kind: MaterialKind::Diffuse { reflectance: Vec3::ZERO },
@@ -215,10 +209,30 @@ impl Reader {
 
     fn normal_map(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
         let mut model = self.inner(parameters)?;
+        if model.surface.normal.is_some() {
+            self.ignored.add(features::MI_BUMP_MAP, || parameters.node.place());
+        }
         parameters.without_effect(&["flip_invalid_normals", "use_shadowing_function"]);
         match self.value(parameters, "normalmap", Role::Index)? {
             Some(Value::Texture(texture)) => model.surface.normal = Some(*texture),
             _ => return Err(parameters.node.error("normalmap: expected the texture `normalmap`")),
+        }
+        Ok(model)
+    }
+
+    fn bump_map(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+        let mut model = self.inner(parameters)?;
+        let scale = Vec3::splat(parameters.float("scale")?.unwrap_or(1.0));
+        for texture in parameters.objects("texture")? {
+            match self.texture(texture, MAX_SCALES)? {
+                // One height everywhere bends nothing.
+                Value::Color(_) => {}
+                Value::Texture(heights) if model.surface.normal.is_none() => {
+                    let heights = heights.affine(scale, Vec3::ZERO);
+                    model.surface.normal = Some(self.reliefs.keep(heights));
+                }
+                _ => self.ignored.add(features::MI_BUMP_MAP, || texture.place()),
+            }
         }
         Ok(model)
     }

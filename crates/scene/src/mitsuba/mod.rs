@@ -40,7 +40,11 @@ use super::{
     instances::Prototype,
 };
 use crate::{
-    beside::Folder, error::Result, import::Imported, material::Material, measured::MeasuredFiles,
+    beside::Folder,
+    error::Result,
+    import::{Imported, relief::Reliefs},
+    material::Material,
+    measured::MeasuredFiles,
     texture::TextureCache,
 };
 
@@ -56,6 +60,7 @@ struct Reader {
     material_numbers: HashMap<[Option<usize>; 3], u32>,
     /// Models around the one that is read.
     models_around: usize,
+    reliefs: Reliefs,
     geometry: Geometry,
     /// Shapes of groups by their element.
     shapes: HashMap<usize, Arc<Shape>>,
@@ -102,6 +107,7 @@ pub(crate) fn read(path: &Path, camera: Option<&str>, folder: Folder) -> Result<
         let Model { kind, surface } = Model::default_of_shapes();
         reader.materials.push(Material { name: "default".into(), kind, surface });
     }
+    reader.reliefs.settle(&mut reader.materials, &reader.geometry);
     let environment = match reader.environment {
         Some(environment) => environment,
         None => EnvironmentMap::constant(Vec3::ZERO, 1.0)

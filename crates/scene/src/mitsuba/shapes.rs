@@ -264,8 +264,9 @@ impl Reader {
         if !surface.vertex_color {
             shape.mesh.colors.clear();
         }
-        let has_bumps = surface.normal.is_some();
-        if has_bumps && !shape.mesh.uvs[0].is_empty() {
+        // Heights bend along the axes of their image, whose directions the triangles have.
+        let has_tangents = surface.normal.as_ref().is_some_and(|normal| !self.reliefs.hold(normal));
+        if has_tangents && !shape.mesh.uvs[0].is_empty() {
             shape.mesh.tangents = tangents(&shape.mesh);
         }
         parameters.finish(&mut self.ignored);

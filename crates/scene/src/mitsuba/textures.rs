@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Most `scale` textures around one another.
-const MAX_SCALES: usize = 8;
+pub(super) const MAX_SCALES: usize = 8;
 
 /// Value that may vary over a surface.
 #[derive(Clone, Debug)]
@@ -92,7 +92,7 @@ impl Reader {
         Ok(value.unwrap_or(Value::Color(Vec3::splat(otherwise))))
     }
 
-    fn texture(&mut self, node: Node<'_>, scales_left: usize) -> Result<Value> {
+    pub(super) fn texture(&mut self, node: Node<'_>, scales_left: usize) -> Result<Value> {
         let parameters = Parameters::new(node);
         let value = match node.kind() {
             "bitmap" | "ldrtexture" => match self.bitmap(&parameters)? {

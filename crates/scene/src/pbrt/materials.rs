@@ -16,6 +16,7 @@ use crate::{
     import::{
         blend::{Share, blend, blend_lobes},
         media,
+        relief::Reliefs,
     },
     material::{ConductorFresnel, Material, MaterialKind, Surface},
     measured::MeasuredFiles,
@@ -39,6 +40,7 @@ pub(super) struct Materials<'a> {
     measured: MeasuredFiles,
     /// Mixtures around the material that is made.
     depth: usize,
+    pub reliefs: Reliefs,
 }
 
 /// Width of the microfacet distribution, constant or by place.
@@ -50,7 +52,13 @@ struct Roughness {
 
 impl<'a> Materials<'a> {
     pub(super) fn new(description: &'a Description, textures: Textures<'a>) -> Self {
-        Self { description, textures, measured: MeasuredFiles::default(), depth: 0 }
+        Self {
+            description,
+            textures,
+            measured: MeasuredFiles::default(),
+            depth: 0,
+            reliefs: Reliefs::default(),
+        }
     }
 
     /// Makes the material that a shape takes; none for a surface that is not there.
@@ -154,8 +162,15 @@ impl<'a> Materials<'a> {
             }
         };
         surface.normal = self.textures.normal_map(entity)?;
-        if let Some(displacement) = entity.find_of("displacement", &[Kind::Texture, Kind::Float])? {
-            self.textures.log.ignore(features::PBRT_DISPLACEMENT, &displacement.place);
+        match self.textures.number(entity, "displacement")? {
+            Some(Value::Image(heights)) if surface.normal.is_none() => {
+                surface.normal = Some(self.reliefs.keep(heights));
+            }
+            Some(Value::Image(_)) => {
+                self.textures.log.ignore(features::PBRT_DISPLACEMENT, &entity.place);
+            }
+            // One height everywhere bends nothing.
+            Some(Value::Constant(_)) | None => {}
         }
         self.textures.log.unused(entity);
         Ok(Some(Material { name, kind, surface }))

@@ -122,8 +122,10 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
     }
     let environment = lights.environment().map_err(|message| Error::scene(path, message))?;
     let Builder { view, materials, kept, geometry, dropped, triangle_count, .. } = builder;
-    let mut log = materials.textures.log;
+    let Materials { reliefs, textures, .. } = materials;
+    let mut log = textures.log;
     let mut materials = kept.materials;
+    reliefs.settle(&mut materials, &geometry);
     for material in &mut materials {
         if let MaterialKind::Plastic { alpha, .. } | MaterialKind::Conductor { alpha, .. } =
             &mut material.kind
@@ -226,7 +228,8 @@ impl Builder<'_> {
         if shape.reverse {
             mesh.reverse();
         }
-        if surface.normal.is_some() {
+        let reliefs = &self.materials.reliefs;
+        if surface.normal.as_ref().is_some_and(|normal| !reliefs.hold(normal)) {
             shapes::give_tangents(&mut mesh, shape.world_from_shape.determinant() < 0.0);
         }
         Ok(Some((mesh, material)))

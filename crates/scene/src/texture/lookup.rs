@@ -17,7 +17,7 @@ fn texture_place(coordinate: f32, wrap: Wrap, size: u32) -> f32 {
 }
 
 /// Index of the texel at a place that may lie up to one image beyond the edges.
-fn wrapped_texel(place: i32, wrap: Wrap, size: u32) -> u32 {
+pub(crate) fn wrapped_texel(place: i32, wrap: Wrap, size: u32) -> u32 {
     let (size, last) = (size as i32, size as i32 - 1);
     let place = match wrap {
         Wrap::Repeat if place < 0 => place + size,

@@ -48,6 +48,7 @@ pub(super) struct LibraryMaterial {
     roughness_map: Option<Map>,
     metallic_map: Option<Map>,
     normal_map: Option<Map>,
+    bump_map: Option<Map>,
 }
 
 impl LibraryMaterial {
@@ -146,7 +147,7 @@ impl<'a> Library<'a> {
             "map_pr" => entry.roughness_map = map(entry),
             "map_pm" => entry.metallic_map = map(entry),
             "norm" => entry.normal_map = map(entry),
-            "bump" | "map_bump" => entry.ignore(features::MTL_BUMP, features::MTL_BUMP.name),
+            "bump" | "map_bump" => entry.bump_map = map(entry),
             _ => entry.ignore(features::MTL_KEY, &format!("`{key}`")),
         }
         Ok(())

@@ -8,7 +8,7 @@ use crate::{
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
     mesh::{
         MeshMaterial,
-        images::{Images, has_alpha},
+        images::{Images, has_alpha, holds_normals},
     },
     texture::{Channels, Encoding},
 };
@@ -71,6 +71,18 @@ impl LibraryMaterial {
         };
         surface.color = color;
         let mut ignored = self.ignored.clone();
+        // Blender and others write normal maps under this key.
+        if let Some(map) = &self.bump_map
+            && let Some(bumps) = load(&self.bump_map, Channels::Color, Encoding::Linear)
+        {
+            if surface.normal.is_none() && holds_normals(&bumps.texture) {
+                surface.normal = Some(bumps);
+                surface.normal_scale = map.options.strength;
+            } else {
+                let place = || format!("material `{}`, {}", self.name, map.place);
+                ignored.add(features::MTL_BUMP, place);
+            }
+        }
         let mut ignore = |feature: Feature| {
             ignored.add(feature, || format!("material `{}`", self.name));
         };
