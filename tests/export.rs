@@ -11,7 +11,7 @@ use fenestra::{
         Scene,
         export::{Settings, gltf, mitsuba::export, pbrt},
         lamp::LampKind,
-        material::MaterialKind,
+        material::{Material, MaterialKind},
         measured::{MeasuredTable, RglTraits},
         texture::{TextureUse, Wrap},
     },
@@ -275,6 +275,30 @@ fn assert_same_values(pairs: [(Vec3, &Option<TextureUse>); 2]) {
     }
 }
 
+/// Factor and texture of a diffuse material.
+fn reflectance_of(material: &Material) -> (Vec3, &Option<TextureUse>) {
+    let MaterialKind::Diffuse { reflectance } = material.kind else { unreachable!("diffuse") };
+    (reflectance, &material.surface.color)
+}
+
+#[test]
+fn an_image_with_two_factors_is_two_images() {
+    let with = |factor| {
+        format!(
+            "type = \"diffuse\"\nreflectance = {{ texture = \"four colours.png\", factor = {factor} }}"
+        )
+    };
+    let loam = with("[1.0, 0.25, 0.5]");
+    let more = format!(
+        "[[material]]\nname = \"loam\"\n{loam}\n[[object]]\nmesh = \"square.obj\"\n\
+         material = \"loam\"\n"
+    );
+    let (_, _, _, scenes) = both(&with("[0.5, 0.25, 1.0]"), &more);
+    for index in 0..2 {
+        assert_same_values(scenes.each_ref().map(|scene| reflectance_of(&scene.materials[index])));
+    }
+}
+
 #[test]
 fn textures_are_the_same_at_all_coordinates() {
     for (keys, file) in [
@@ -291,13 +315,7 @@ fn textures_are_the_same_at_all_coordinates() {
         assert_eq!(warnings, [""; 0]);
         assert!(folder.path().join("out").join(file).is_file(), "{keys}: {xml}");
         assert_parts(&xml, &[&format!("value=\"out/{file}\"")]);
-        let uses = [&ours, &read].map(|scene| {
-            let MaterialKind::Diffuse { reflectance } = scene.materials[0].kind else {
-                unreachable!("diffuse")
-            };
-            (reflectance, &scene.materials[0].surface.color)
-        });
-        assert_same_values(uses);
+        assert_same_values([&ours, &read].map(|scene| reflectance_of(&scene.materials[0])));
         let (header, _) = ply(&folder.path().join("out/m00_clay.ply"));
         assert_parts(&header, &["property float u\nproperty float v\n"]);
         assert_eq!(read.materials[0].surface.two_sided, ours.materials[0].surface.two_sided);

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 use std::{
+    collections::HashSet,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -15,7 +16,8 @@ use fenestra_scene::{
     material::{ConductorFresnel, MaterialKind, Principled},
     mesh::Mesh,
     picture::{Image, RgbImage},
-    texture::{Channels, Encoding, Interpolation, Wrap},
+    still_hash,
+    texture::{Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
 };
 use glam::Vec3;
 use tempfile::TempDir;
@@ -853,7 +855,7 @@ fn an_included_file_names_the_group_of_its_lights() {
     let material =
         "MakeNamedMaterial \"pane\" \"string type\" \"diffuse\"\nNamedMaterial \"pane\"\n";
     folder.write("quad.pbrt", format!("Camera \"perspective\"\nWorldBegin\n{material}{quad}"));
-    let light = "LightSource \"point\"\nAreaLightSource \"diffuse\"\n";
+    let light = "LightSource \"point\"\nLightSource \"distant\"\nAreaLightSource \"diffuse\"\n";
     folder.write("lamps.pbrt", format!("Camera \"perspective\"\nWorldBegin\n{light}{quad}"));
     let scene = |include: &str| {
         let glow = with_box("").replace("\"diffuse\"", "\"diffuse\"\nemission = [1, 1, 1]");
@@ -863,7 +865,8 @@ fn an_included_file_names_the_group_of_its_lights() {
     assert_eq!(groups(&scene("\"lamps.pbrt\"")), ["environment", "lamps"]);
     let named = scene("\"lamps.pbrt\"\nlight_group = \"ceiling\"");
     assert_eq!(groups(&named), ["environment", "ceiling", "lamps"]);
-    assert_eq!(named.lamps[0].light_group.as_deref(), Some("ceiling"));
+    let of_lamps: Vec<_> = named.lamps.iter().map(|lamp| lamp.light_group.as_deref()).collect();
+    assert_eq!(of_lamps, [Some("ceiling"); 2]);
     let lit = |scene: &Scene| {
         let index = scene.geometry.materials.last().copied().unwrap() as usize;
         scene.materials[index].surface.light_group.clone()
@@ -911,6 +914,38 @@ fn the_hash_follows_the_picture_and_not_the_text() {
     ] {
         assert_ne!(original, hash(&with_box("").replace(from, to)), "{from} → {to}");
     }
+}
+
+#[test]
+fn the_hash_follows_every_part_of_a_texture() {
+    let mut scene = Folder::new().load(&with_box("")).unwrap();
+    let texels = Texels::Bytes(vec![[1, 2, 3, 4], [5, 6, 7, 8]]);
+    let texture = Texture { name: "a".into(), width: 2, height: 1, texels };
+    let changes: [fn(&mut TextureUse); 13] = [
+        |_| (),
+        |used| Arc::make_mut(&mut used.texture).texels = Texels::Bytes(vec![[1; 4]; 2]),
+        |used| {
+            let texture = Arc::make_mut(&mut used.texture);
+            (texture.width, texture.height) = (1, 2);
+        },
+        |used| used.channels = Channels::Red,
+        |used| used.encoding = Encoding::Linear,
+        |used| used.uv_set = 1,
+        |used| used.image_from_uv[0][1] = 0.5,
+        |used| used.image_from_uv[1][2] = 0.5,
+        |used| used.wrap[0] = Wrap::Mirror,
+        |used| used.wrap[1] = Wrap::Mirror,
+        |used| used.interpolation = Interpolation::Nearest,
+        |used| used.scale[2] = 0.5,
+        |used| used.bias[2] = 0.5,
+    ];
+    let hashes = changes.map(|change| {
+        let mut used = TextureUse::new(Arc::new(texture.clone()));
+        change(&mut used);
+        scene.materials[0].surface.color = Some(used);
+        still_hash(&scene)
+    });
+    assert_eq!(hashes.iter().collect::<HashSet<_>>().len(), changes.len(), "{hashes:#?}");
 }
 
 // Meshes

@@ -204,6 +204,11 @@ mod tests {
         assert_eq!(mesh.triangles.len(), 32);
         assert!(mesh.positions.iter().all(|position| position[2] == 0.0));
         assert!(mesh.normals.iter().all(|normal| *normal == [0.0, 0.0, 1.0]));
+        // Limits of a corner between the ends of its edges: ⅗ of itself and ⅕ of each.
+        for (levels, expected) in [(0, 0.2), (1, 0.6 * 0.125 + 0.2 * 0.5)] {
+            let [x, y, _] = subdivide(&positions, triangles.clone(), levels).unwrap().positions[0];
+            assert!((x - expected).abs() < 1e-6 && (y - expected).abs() < 1e-6, "{x}, {y}");
+        }
         for levels in [-1, 13, i64::MAX] {
             assert!(subdivide(&positions, triangles.clone(), levels).is_err());
         }
