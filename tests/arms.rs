@@ -58,7 +58,7 @@ fn the_arm_is_measured_and_told() {
     let _alone = support::alone();
     let mut auto = renderer(&room(), guided(None));
     assert_eq!((auto.report().candidates, auto.report().choice), (None, None));
-    auto.render_pass(65).unwrap();
+    auto.render_pass(129).unwrap();
     let report = auto.report();
     let found = costs(&report.figures);
     eprintln!("{:?} of {found:#?}", report.choice);
@@ -74,7 +74,7 @@ fn the_arm_is_measured_and_told() {
         assert!(names.iter().any(|arm| arm.starts_with(name)), "{name} of {names:?}");
     }
     assert!(found.iter().all(|cost| cost.ms_per_sample > 0.0 && cost.rounds > 0), "{found:?}");
-    for at_samples in [0, 64] {
+    for at_samples in [0, 128] {
         let chosen = found.iter().filter(|cost| cost.at_samples == at_samples && cost.is_chosen);
         assert_eq!(chosen.count(), 1);
     }
@@ -84,7 +84,7 @@ fn the_arm_is_measured_and_told() {
     assert!((1..=2 * 64 * 48).contains(&taught), "{taught}");
     // No clock takes part.
     let mut again = renderer(&room(), guided(None));
-    again.render_pass(65).unwrap();
+    again.render_pass(129).unwrap();
     assert_same(&auto.sums().unwrap(), &again.sums().unwrap());
     support::assert_silent();
 }

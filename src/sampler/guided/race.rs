@@ -34,7 +34,7 @@ const RACES: [(u32, Axes, u64); 5] = [
     (64, Axes::Everything, 9),
 ];
 /// Paths of the film for each that races after the first measure, if they take all rounds.
-const FILM_PATHS: u64 = 8;
+const FILM_PATHS: u64 = 16;
 /// Separates the random numbers of measurements from those of the training and of the picture.
 const MEASURING_SEED: u32 = 0x2c1b_3c6d;
 /// Most pixels in a wave; a larger film needs no more to tell which arm is better.
@@ -253,8 +253,7 @@ mod tests {
         let due = |pixels| (0..8).map(|race| race_due(race, pixels).0).collect::<Vec<u32>>();
         assert_eq!(due(1 << 20), [0, 2, 2, 16, 64, 256, 1024, 4096]);
         assert_eq!(race_due(40, 1 << 20).0, u32::MAX);
-        // An eighth of the pixels, four samples each, four arms, four rounds: as much as 64 samples,
-        // after which the guide is next rebuilt.
-        assert_eq!(due(3072)[..3], [0, 64, 128]);
+        // An eighth of the pixels, four samples each, four arms, four rounds: a sixteenth of 128 samples.
+        assert_eq!(due(3072)[..3], [0, 128, 256]);
     }
 }
