@@ -588,6 +588,21 @@ fn colours_of_vertices_are_written_with_their_factor() {
     assert!(alphas(&read) > 0, "{:?}", read.geometry.colors.first());
 }
 
+/// Tangents stand on normals.
+#[test]
+fn flat_faces_keep_their_bumps_in_gltf() {
+    let folder = Folder::new();
+    write_square(&folder);
+    let clay = format!("{DIFFUSE}\nnormal = {{ texture = \"four colours.png\" }}");
+    let text = yard([8, 6], "constant = [0, 0, 0]", &clay, "mesh = \"square.obj\"");
+    let mut scene = Scene::load(&folder.write("scene.toml", text)).unwrap();
+    scene.geometry.normals.fill([0.0; 3]);
+    let path = folder.path().join("out.gltf");
+    gltf::export(&scene, &path).write().unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    assert_parts(&text, &["\"NORMAL\"", "\"TANGENT\""]);
+}
+
 /// Numbers of images are at most 1 in glTF.
 #[test]
 fn images_of_radiance_keep_it_in_gltf() {

@@ -249,6 +249,13 @@ fn the_cache_is_used_and_survives_damage() {
         assert!(fit(&target, 8).is_cached);
     }
 
+    let tables = conductor(0.3);
+    let is_cached = |method| {
+        let options = BrdfOptions { lobes: 2, views: 2, method };
+        brdf_lobes(&tables, 0, "metal", options, Some(&cache), &mut |_| ()).unwrap().is_cached
+    };
+    assert_eq!([Method::Em, Method::Em, Method::L2].map(is_cached), [false, true, false]);
+
     // A cache that cannot be written does no harm.
     let blocked = folder.path().join("file");
     fs::write(&blocked, "").unwrap();

@@ -78,6 +78,10 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
     assert_eq!((base_color, metallic), (Vec3::new(0.8, 0.6, 0.4), 0.25));
     assert_eq!((roughness, ior, specular), (0.5, 1.4, 0.5));
     assert_eq!(specular_color, Vec3::new(2.0, 1.0, 1.0));
+    // The index 0 is an infinite one, of which the factors alone are left.
+    let (mirror, _) = gltf_material(&folder, &material.replace("1.4", "0"), &rest);
+    let MaterialKind::Principled(Principled { specular_color, .. }) = mirror.kind else { panic!() };
+    assert!(specular_color.abs_diff_eq(Vec3::new(50.0, 25.0, 25.0), 1e-4), "{specular_color}");
     let surface = found.surface;
     let color = surface.color.unwrap();
     assert_eq!((color.channels, color.encoding), (Channels::Color, Encoding::Srgb));
@@ -316,6 +320,12 @@ fn transmission_by_texture_is_glass_where_it_says_so() {
     assert_eq!((of(0.0).name.as_str(), of(2.0).name.as_str()), ("lamp, glass", "lamp"));
     let is_named = |text: &&String| text.contains("glass or opaque by its mean there");
     assert_eq!(scene.warnings.iter().filter(is_named).count(), 1, "{:?}", scene.warnings);
+
+    // Factor times texel is less than half.
+    folder.write("t.png", png([[150, 0, 0, 255], [0, 0, 0, 255]]));
+    let weak = material.replace("\"transmissionFactor\": 1", "\"transmissionFactor\": 0.8");
+    let scene = Scene::load(&folder.write("b.gltf", gltf_of(&attributes, 6, &weak, rest))).unwrap();
+    assert!(scene.materials.iter().all(|material| !material.kind.is_glass()));
 }
 
 /// A wall of two faces on the same points: each side shows its own.
@@ -437,6 +447,11 @@ fn normal_maps_without_tangents_get_them() {
     let stored =
         Attribute("TANGENT", 5126, "VEC4", false, floats(&[0.0, 1.0, 0.0, -1.0].repeat(3)));
     assert_eq!(read(&[positions(), uvs(), stored], material).tangents[0], [0.0, 1.0, 0.0, -1.0]);
+    let mut some = [0.0, 1.0, 0.0, -1.0].repeat(3);
+    some[..4].fill(0.0);
+    let some = Attribute("TANGENT", 5126, "VEC4", false, floats(&some));
+    let mesh = read(&[positions(), uvs(), some], material);
+    assert_eq!((mesh.tangents.len(), mesh.tangents[0][..3].to_vec()), (3, vec![0.0; 3]));
     assert!(read(&[positions(), uvs()], "{}").tangents.is_empty());
 
     // An OBJ file counts v from below, and may name normals under the key of heights. Two triangles share

@@ -696,11 +696,14 @@ fn instances_repeat_their_group() {
     assert!(message.contains("a shapegroup contains itself"), "{message}");
 }
 
-/// A serialized file of one triangle with texture coordinates, in double precision if asked.
-fn serialized(version: u16, double: bool, corner: u32) -> Vec<u8> {
+/// Flags of single and double precision.
+const SINGLE: u32 = 0x1000;
+const DOUBLE: u32 = 0x2000;
+
+/// A serialized file of one triangle with texture coordinates and `flags`.
+fn serialized(version: u16, flags: u32, corner: u32) -> Vec<u8> {
     let mut content = Vec::new();
-    let flags: u32 = 0x0002 | if double { 0x2000 } else { 0x1000 };
-    content.extend(flags.to_le_bytes());
+    content.extend((0x0002 | flags).to_le_bytes());
     if version == 4 {
         content.extend(b"sail\0");
     }
@@ -708,7 +711,7 @@ fn serialized(version: u16, double: bool, corner: u32) -> Vec<u8> {
     content.extend(1_u64.to_le_bytes());
     let numbers = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 1.0];
     for number in numbers {
-        if double {
+        if flags & DOUBLE != 0 {
             content.extend(f64::to_le_bytes(number));
         } else {
             content.extend((number as f32).to_le_bytes());
@@ -738,20 +741,22 @@ fn serialized_meshes_of_both_versions_are_read() {
         )
     };
     let path = folder.write("a.xml", document(&shape(0)));
-    for (version, double) in [(3, false), (3, true), (4, false), (4, true)] {
-        folder.write("a.serialized", serialized(version, double, 2));
+    for (version, flags) in [(3, SINGLE), (3, DOUBLE), (4, SINGLE), (4, DOUBLE)] {
+        folder.write("a.serialized", serialized(version, flags, 2));
         let scene = loaded(&path);
         assert_eq!(scene.geometry.positions[1], [1.0, 0.0, 0.0]);
         assert_eq!(scene.geometry.uvs[0][0], [0.0, 0.25]);
         assert_eq!(scene.geometry.triangles, [[0, 1, 2]]);
         assert_eq!(scene.geometry.normals[2], [0.0, 0.0, 1.0], "smooth where none are given");
+        folder.write("a.serialized", serialized(version, flags | 0x0010, 2));
+        assert_eq!(loaded(&path).geometry.normals[2], [0.0; 3], "flat where the file says so");
     }
-    let whole = serialized(4, false, 2);
+    let whole = serialized(4, SINGLE, 2);
     for length in 0..whole.len() {
         folder.write("a.serialized", &whole[..length]);
         assert!(Scene::load(&path).is_err(), "cut off at {length}");
     }
-    folder.write("a.serialized", serialized(4, false, 3));
+    folder.write("a.serialized", serialized(4, SINGLE, 3));
     let message = Scene::load(&path).unwrap_err().to_string();
     assert!(message.contains("a triangle has the vertex 3, there are 3"), "{message}");
     folder.write("a.serialized", whole);

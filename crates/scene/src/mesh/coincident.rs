@@ -174,13 +174,16 @@ mod tests {
         mesh::MeshMaterial,
     };
 
-    /// Three materials: two opaque ones, and one that lets half the light through.
+    /// Four materials: two opaque ones, one that lets half the light through, and glass.
     fn mesh(triangles: Vec<[u32; 3]>, is_culled: bool) -> Mesh {
-        let material = |factor: f32| {
+        let white = Vec3::ONE;
+        let diffuse = MaterialKind::Diffuse { reflectance: white };
+        let glass =
+            MaterialKind::ThinDielectric { ior: 1.5, reflectance: white, transmittance: white };
+        let material = |factor: f32, kind: &MaterialKind| {
             let opacity = Opacity { factor, ..Opacity::default() };
-            let kind = MaterialKind::Diffuse { reflectance: Vec3::ONE };
             let surface = Surface { opacity, ..Surface::default() };
-            let material = Material { surface, ..Material::new("", kind) };
+            let material = Material { surface, ..Material::new("", kind.clone()) };
             MeshMaterial { material, ignored: Ignored::default(), is_culled }
         };
         let runs = (0..triangles.len())
@@ -192,7 +195,11 @@ mod tests {
             colors: vec![[1.0; 4]; 4],
             triangles,
             runs,
-            materials: vec![material(1.0), material(1.0), material(0.5)],
+            materials: [1.0, 1.0, 0.5]
+                .map(|factor| material(factor, &diffuse))
+                .into_iter()
+                .chain([material(1.0, &glass)])
+                .collect(),
             ..Mesh::default()
         }
     }
@@ -221,7 +228,7 @@ mod tests {
         let (found, warnings) = heights(&[front, [1, 2, 3]], true);
         assert_eq!(found, [0.0, 0.0]);
         assert!(warnings[0].contains("1 triangles lie on others"), "{warnings:?}");
-        assert_eq!(heights(&[front, back, front], true).0, [1.0, -1.0, 2.0]);
+        assert_eq!(heights(&[front, back, front, back], true).0, [1.0, -1.0, 2.0, -2.0]);
         // Another place, and no area.
         assert_eq!(heights(&[front, [0, 3, 1]], false), (vec![0.0, 0.0], vec![]));
     }
