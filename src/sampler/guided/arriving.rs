@@ -16,8 +16,9 @@ pub const ARRIVAL_DIRECTIONS: usize = (GUIDE_ARRIVAL_SIDE * GUIDE_ARRIVAL_SIDE) 
 
 /// Weight of the prior, in rays.
 const PRIOR_RAYS: f32 = 4.0;
-/// Share of the estimate that is the same for every direction.
-const UNIFORM_SHARE: f32 = 0.2;
+/// Share of the estimate that is the same for every direction, which bounds the weight of a bounce toward
+/// light that is not expected.
+const UNIFORM_SHARE: f32 = 0.5;
 /// Reflectance of surfaces for the light that arrives from other surfaces.
 const ASSUMED_REFLECTANCE: f32 = 0.5;
 /// Units of the mean light of all cells in [`Reflected::units`].
@@ -179,7 +180,7 @@ mod tests {
     fn light_is_relative_and_never_zero() {
         let mut light = [0.0, 1.0, 0.0, 3.0];
         make_relative(&mut light);
-        assert_eq!(light, [0.2, 0.2 + 0.8, 0.2, 0.2 + 2.4]);
+        assert_eq!(light, [0.5, 1.0, 0.5, 2.0]);
         let mut dark = [0.0; 3];
         make_relative(&mut dark);
         assert_eq!(dark, [1.0; 3], "all alike where nothing arrives");
