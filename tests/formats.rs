@@ -92,24 +92,6 @@ fn everything_that_a_gltf_file_loses_is_named_once() {
 }
 
 #[test]
-fn compressed_meshes_are_refused_by_name() {
-    for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression"] {
-        let rest =
-            format!(", \"extensionsRequired\": [\"{name}\"], \"extensionsUsed\": [\"{name}\"]");
-        let folder = Folder::new();
-        let path = folder.write("a.gltf", gltf(r#"{"mesh": 0}"#, "", "", &rest));
-        let found = Scene::load(&path).unwrap_err().to_string();
-        let expected = format!("the file requires the extension `{name}`, which is not supported");
-        assert!(found.contains("a.gltf") && found.contains(&expected), "{found}");
-        assert!(found.contains("`npx @gltf-transform/cli copy IN.glb OUT.glb`"), "{found}");
-        // Without the need for it, the uncompressed mesh is read and the extension named.
-        let scene =
-            load("a.gltf", &gltf(r#"{"mesh": 0}"#, "", "", &rest.replace("Required", "Wanted")));
-        assert_eq!(scene.geometry.triangles.len(), 1);
-    }
-}
-
-#[test]
 fn a_variant_chooses_the_materials_of_primitives() {
     let materials = r#"{"name": "beech"}, {"name": "oak"}"#;
     let mappings = r#", "material": 0, "extensions": {"KHR_materials_variants": {"mappings": [

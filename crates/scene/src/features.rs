@@ -177,9 +177,11 @@ features! {
 }
 
 /// Extensions of glTF that are read.
-pub const GLTF_EXTENSIONS: [&str; 12] = [
+pub const GLTF_EXTENSIONS: [&str; 14] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",

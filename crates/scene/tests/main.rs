@@ -4,6 +4,7 @@ mod support;
 
 mod animation;
 mod brdf_formats;
+mod compressed_meshes;
 mod environment_files;
 mod exr;
 mod fuzz;

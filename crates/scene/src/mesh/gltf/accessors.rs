@@ -5,7 +5,7 @@ use gltf::{
     buffer::View,
 };
 
-use super::{GltfReader, document::CONVERSION};
+use super::GltfReader;
 use crate::{
     error::{Error, Result},
     memory,
@@ -127,16 +127,7 @@ impl<'a> GltfReader<'a> {
             None if accessor.sparse().is_some() && count <= MAX_ZEROS => {
                 (0..count).map(|_| element(&vec![0; size])).collect()
             }
-            None => {
-                let compressed = "KHR_draco_mesh_compression";
-                let has_draco = self.document.extensions_used().any(|used| used == compressed);
-                let cause = if has_draco {
-                    format!(" (`{compressed}`: {CONVERSION})")
-                } else {
-                    String::new()
-                };
-                return Err(self.error(format!("{label} has no buffer view{cause}")));
-            }
+            None => return Err(self.error(format!("{label} has no buffer view"))),
         };
         if let Some(sparse) = accessor.sparse() {
             let (indices, values) = (sparse.indices(), sparse.values());

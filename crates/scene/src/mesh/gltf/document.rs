@@ -10,31 +10,27 @@ use gltf::{
 };
 use serde_json::Value;
 
-use super::variants;
+use super::{compression, variants};
 use crate::{
     beside::Folder,
     error::{Error, Result},
     features, files,
 };
 
-/// Remedy for meshes that are compressed.
-pub(super) const CONVERSION: &str =
-    "`npx @gltf-transform/cli copy IN.glb OUT.glb` writes a file without the compression";
-
-/// Parses and checks a document; returns it with its binary chunk and its JSON as a tree, which
+/// Parses a document; returns it, to be [`checked`], with its binary chunk and its JSON as a tree, which
 /// holds the extensions. With the name of a variant, primitives have its materials.
 pub(super) fn parse(
     path: &Path,
     bytes: &[u8],
     variant: Option<&str>,
 ) -> Result<(Document, Option<Vec<u8>>, Value)> {
-    let not_gltf =
-        |error: gltf::Error| Error::format(path, format!("not a glTF document: {error}"));
     let not_json = |error: serde_json::Error| {
         let message = format!("not a glTF document: {error}");
         Error::parse(path, error.line(), error.column(), message)
     };
-    let glb = bytes.starts_with(b"glTF").then(|| Glb::from_slice(bytes).map_err(not_gltf));
+    let glb = bytes
+        .starts_with(b"glTF")
+        .then(|| Glb::from_slice(bytes).map_err(|error| not_gltf(path, &error)));
     let glb = glb.transpose()?;
     let text = glb.as_ref().map_or(bytes, |glb| &glb.json);
     let mut json: Value = serde_json::from_slice(text).map_err(not_json)?;
@@ -59,12 +55,9 @@ pub(super) fn parse(
         let name = format!("`{extension}`");
         let is_left_out = features::GLTF.iter().any(|feature| feature.name == name);
         if !is_left_out && !features::GLTF_EXTENSIONS.contains(&extension.as_str()) {
-            let remedy = match extension.as_str() {
-                "KHR_draco_mesh_compression" | "EXT_meshopt_compression" => CONVERSION,
-                _ => "export it without",
-            };
             let message = format!(
-                "the file requires the extension `{extension}`, which is not supported: {remedy}"
+                "the file requires the extension `{extension}`, which is not supported: export it \
+                 without"
             );
             return Err(Error::format(path, message));
         }
@@ -78,18 +71,26 @@ pub(super) fn parse(
         variants::choose(name, &mut json, &mut root)
             .map_err(|message| Error::format(path, message))?;
     }
-    let document = Document::from_json(root).map_err(not_gltf)?;
-    Ok((document, glb.and_then(|glb| glb.bin).map(|bin| bin.into_owned()), json))
+    Ok((
+        Document::from_json_without_validation(root),
+        glb.and_then(|glb| glb.bin).map(|bin| bin.into_owned()),
+        json,
+    ))
 }
 
 pub(super) fn read_buffers(
     path: &Path,
     document: &Document,
+    json: &Value,
     mut blob: Option<Vec<u8>>,
 ) -> Result<Vec<Vec<u8>>> {
     let mut buffers = Vec::new();
     for buffer in document.buffers() {
         let index = buffer.index();
+        if compression::is_fallback(&json["buffers"][index]) {
+            buffers.push(Vec::new());
+            continue;
+        }
         let bytes = match buffer.source() {
             Source::Bin => blob.take().ok_or_else(|| {
                 Error::format(path, format!("buffer {index} is in a chunk that the file lacks"))
@@ -112,6 +113,22 @@ pub(super) fn read_buffers(
         buffers.push(bytes);
     }
     Ok(buffers)
+}
+
+/// Checks a document, whose compressed parts have been expanded.
+pub(super) fn checked(path: &Path, root: Root) -> Result<Document> {
+    Document::from_json(root).map_err(|error| not_gltf(path, &error))
+}
+
+fn not_gltf(path: &Path, error: &gltf::Error) -> Error {
+    let message = match error {
+        gltf::Error::Validation(faults) if !faults.is_empty() => {
+            let (place, fault) = &faults[0];
+            format!("`{place}`: {fault} (faults: {})", faults.len())
+        }
+        _ => error.to_string(),
+    };
+    Error::format(path, format!("not a glTF document: {message}"))
 }
 
 /// Checks that the accessor of every primitive's positions exists, on which the validation by the

@@ -6,6 +6,7 @@
 
 mod accessors;
 mod animation;
+mod compression;
 mod contents;
 mod document;
 mod glossiness;
@@ -67,11 +68,13 @@ pub fn read(
     }
     let (document, blob, json) = document::parse(path, &bytes, variant)?;
     drop(bytes);
+    let mut buffers = document::read_buffers(path, &document, &json, blob)?;
+    let document = compression::expand(path, document, &json, &mut buffers)?;
     let mut reader = GltfReader {
         path,
         document: &document,
         json: &json,
-        buffers: document::read_buffers(path, &document, blob)?,
+        buffers,
         mesh: Mesh::default(),
         budget,
         copies: HashMap::new(),
