@@ -4,6 +4,7 @@
 
 use std::io::Cursor;
 
+use base64::prelude::{BASE64_STANDARD, Engine};
 use image::{ImageFormat, RgbaImage};
 
 /// A triangle of one unit in a buffer of 36 bytes, then a shift by (0, 0, 7) and its index 1.
@@ -74,19 +75,7 @@ pub fn gltf_of(attributes: &[Attribute], count: usize, materials: &str, rest: &s
 
 /// Encodes bytes in base64.
 pub fn base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    bytes
-        .chunks(3)
-        .flat_map(|group| {
-            let bits = group.iter().fold(0, |bits, byte| bits << 8 | u32::from(*byte))
-                << (8 * (3 - group.len()));
-            let digit = move |place: usize| match place <= group.len() {
-                true => DIGITS[(bits >> (18 - 6 * place) & 63) as usize] as char,
-                false => '=',
-            };
-            (0..4).map(digit).collect::<Vec<_>>()
-        })
-        .collect()
+    BASE64_STANDARD.encode(bytes)
 }
 
 /// Encodes a PNG of 2×1 texels.

@@ -15,6 +15,7 @@ mod nodes;
 
 use std::{io::Write, path::Path};
 
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Map, Value, json};
 
 use self::{
@@ -29,6 +30,9 @@ use super::{
     subject::Subject,
 };
 use crate::{Scene, files};
+
+/// Characters of a name that a URI writes otherwise (RFC 3986).
+const IN_URI: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
 
 /// Translates the materials and lamps for a scene file at `path`, without writing anything.
 pub fn export<'a>(scene: &'a Scene, path: &Path) -> Export<'a> {
@@ -75,7 +79,7 @@ pub fn export<'a>(scene: &'a Scene, path: &Path) -> Export<'a> {
                 .enumerate()
                 .map(|(index, mesh)| json!({"name": mesh["name"], "mesh": index})),
         );
-        let uri_of = |name: &str| format!("{}/{name}", percent_encoded(&folder.name));
+        let uri_of = |name: &str| format!("{}/{name}", utf8_percent_encode(&folder.name, IN_URI));
         let version = env!("CARGO_PKG_VERSION");
         let mut document = Map::new();
         let mut insert = |name: &str, value: Value| {
@@ -144,14 +148,4 @@ fn meshes(scene: &Scene, parts: &[Parts]) -> (Vec<Value>, Buffer) {
         }
     }
     (meshes, buffer)
-}
-
-/// Name as a part of a URI (RFC 3986).
-fn percent_encoded(name: &str) -> String {
-    let encoded = |byte: u8| match byte {
-        b'-' | b'.' | b'_' | b'~' => char::from(byte).to_string(),
-        _ if byte.is_ascii_alphanumeric() => char::from(byte).to_string(),
-        _ => format!("%{byte:02X}"),
-    };
-    name.bytes().map(encoded).collect()
 }

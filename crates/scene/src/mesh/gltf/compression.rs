@@ -25,7 +25,6 @@ use meshopt_rs::{
 };
 use serde_json::Value;
 
-use super::document::checked;
 use crate::{
     error::{Error, Result},
     memory,
@@ -40,17 +39,17 @@ pub(super) fn is_fallback(buffer: &Value) -> bool {
 }
 
 /// Appends what the compressed parts of a document hold to its buffers, and returns the document that finds
-/// it there, checked.
+/// it there.
 ///
 /// # Errors
-/// [`Error::Format`] for data that cannot be decoded or is not what the document says, for want of memory,
-/// and for any other fault of the document.
+/// [`Error::Format`] for data that cannot be decoded or is not what the document says, and for want of
+/// memory.
 pub(super) fn expand(
     path: &Path,
     document: Document,
     json: &Value,
     buffers: &mut Vec<Vec<u8>>,
-) -> Result<Document> {
+) -> Result<Root> {
     let error =
         |place: String| move |message: String| Error::format(path, format!("{place}: {message}"));
     let mut expansion = Expansion { root: document.into_json(), buffers };
@@ -69,7 +68,7 @@ pub(super) fn expand(
             }
         }
     }
-    checked(path, expansion.root)
+    Ok(expansion.root)
 }
 
 /// Elements of an array with their places.

@@ -2,12 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
+use base64::{
+    Engine, alphabet,
+    engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig},
+};
 use gltf::{
     Document, Glb,
     buffer::Source,
     json::{Root, validation::Checked},
     mesh::Semantic,
 };
+use percent_encoding::percent_decode_str;
 use serde_json::Value;
 
 use super::{compression, variants};
@@ -16,6 +21,12 @@ use crate::{
     error::{Error, Result},
     features, files,
 };
+
+/// Base64 with or without padding (RFC 4648, section 4).
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
 
 /// Parses a document; returns it, to be [`checked`], with its binary chunk and its JSON as a tree, which
 /// holds the extensions. With the name of a variant, primitives have its materials.
@@ -154,15 +165,16 @@ fn check_positions(path: &Path, root: &Root) -> Result<()> {
 
 /// Path of a file that is named by a relative URI.
 pub(super) fn beside(path: &Path, uri: &str) -> Result<PathBuf> {
-    let name = decode_percent(uri)
-        .ok_or_else(|| Error::format(path, format!("cannot read the file name `{uri}`")))?;
+    let name = percent_decode_str(uri)
+        .decode_utf8()
+        .map_err(|_| Error::format(path, format!("cannot read the file name `{uri}`")))?;
     Folder::of(path).file(&name).map_err(|message| Error::format(path, message))
 }
 
 /// Content of a URI that holds it; none if it names a file, and none inside if it is no base64.
 pub(super) fn data_of(uri: &str) -> Option<Option<Vec<u8>>> {
     let data = uri.strip_prefix("data:")?;
-    Some(data.split_once(";base64,").and_then(|(_, text)| decode_base64(text)))
+    Some(data.split_once(";base64,").and_then(|(_, text)| BASE64.decode(text).ok()))
 }
 
 /// Removes the members `extras` of objects at any depth.
@@ -174,64 +186,5 @@ fn remove_extras(value: &mut Value) {
         }
         Value::Array(elements) => elements.iter_mut().for_each(remove_extras),
         _ => {}
-    }
-}
-
-fn decode_percent(uri: &str) -> Option<String> {
-    let mut bytes = Vec::with_capacity(uri.len());
-    let mut rest = uri.as_bytes();
-    while let [first, tail @ ..] = rest {
-        rest = tail;
-        if *first == b'%' {
-            let digits = std::str::from_utf8(tail.get(..2)?).ok()?;
-            bytes.push(u8::from_str_radix(digits, 16).ok()?);
-            rest = &tail[2..];
-        } else {
-            bytes.push(*first);
-        }
-    }
-    String::from_utf8(bytes).ok()
-}
-
-/// Decodes standard base64 (RFC 4648 section 4), with or without padding.
-fn decode_base64(text: &str) -> Option<Vec<u8>> {
-    let digits = text.trim_end_matches('=').as_bytes();
-    let mut bytes = Vec::with_capacity(digits.len() * 3 / 4);
-    for group in digits.chunks(4) {
-        if group.len() == 1 {
-            return None;
-        }
-        let mut bits = 0_u32;
-        for digit in group {
-            let value = match digit {
-                b'A'..=b'Z' => digit - b'A',
-                b'a'..=b'z' => digit - b'a' + 26,
-                b'0'..=b'9' => digit - b'0' + 52,
-                b'+' => 62,
-                b'/' => 63,
-                _ => return None,
-            };
-            bits = bits << 6 | u32::from(value);
-        }
-        bits <<= 6 * (4 - group.len());
-        bytes.extend_from_slice(&bits.to_be_bytes()[1..group.len()]);
-    }
-    Some(bytes)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn base64_and_percent_codes_are_undone() {
-        // RFC 4648 section 10.
-        for (text, bytes) in [("", ""), ("Zg==", "f"), ("Zm8=", "fo"), ("Zm9vYmFy", "foobar")] {
-            assert_eq!(decode_base64(text).as_deref(), Some(bytes.as_bytes()));
-        }
-        assert_eq!(decode_base64("Zm9v*A=="), None);
-        assert_eq!(decode_base64("A"), None);
-        assert_eq!(decode_percent("a%20b.bin").as_deref(), Some("a b.bin"));
-        assert_eq!(decode_percent("a%2"), None);
     }
 }

@@ -69,7 +69,8 @@ pub fn read(
     let (document, blob, json) = document::parse(path, &bytes, variant)?;
     drop(bytes);
     let mut buffers = document::read_buffers(path, &document, &json, blob)?;
-    let document = compression::expand(path, document, &json, &mut buffers)?;
+    let root = compression::expand(path, document, &json, &mut buffers)?;
+    let document = document::checked(path, root)?;
     let mut reader = GltfReader {
         path,
         document: &document,
