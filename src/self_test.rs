@@ -200,7 +200,12 @@ impl Answers {
             (Kernel::new(list_paths, Domain::Arrivals, &[]), &path_set),
             (traversal.shadow(schedule, Surfaces::default()), &shadow_set),
         ] {
-            Pass::new(device, kernel)?.record(&mut commands, &[&scene, wave_set, &film], &wave);
+            Pass::new(device, kernel)?.record(
+                &mut commands,
+                &[&scene, wave_set, &film],
+                &wave,
+                None,
+            );
         }
         commands.submit_and_wait()?;
 

@@ -61,6 +61,10 @@ fn every_timed_pass_has_its_row() {
     let times = commands.submit_and_wait().unwrap();
     assert_eq!(times.keys().collect::<Vec<_>>(), ["probe"]);
     assert!(times["probe"] > 0.0);
+    // Passes of few invocations take their part of the time too.
+    let mut few = Commands::begin_timed(device, 1).unwrap();
+    few.dispatch(&pipeline, &[&forth], &[], 64);
+    assert!(few.submit_and_wait().unwrap()["probe"] > 0.0);
     // Each dispatch sees the writes of the one before.
     assert!(input.download::<u32>(1 << 20).unwrap().iter().all(|word| *word == 4));
     support::assert_silent();

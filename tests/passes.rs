@@ -113,7 +113,7 @@ fn simple_samplers_trace_groups_of_eight_rays() {
     assert_eq!(counts, [0, 0, 8, 8, 8, 1, 1, 1, 1, 1]);
     assert!(listed[2..].iter().all(|dispatch| dispatch.wave.total_shadow_rays == 9));
     // A path, a pixel or a shadow ray for each invocation; rays that part share invocations.
-    let invocations = |pass: usize| listed[pass].kernel.invocations(&listed[pass].wave);
+    let invocations = |pass: usize| listed[pass].kernel.invocations(&listed[pass].wave, None);
     assert_eq!((invocations(0), invocations(2), invocations(8)), (20, 20, 20));
     assert_eq!(invocations(3), 64, "160 shadow rays, 16 for each invocation");
 }
@@ -276,6 +276,13 @@ fn later_vertices_walk_lists_of_living_paths() {
             ("gather", 2),
         ]
     );
+    // Where the host knows how long lists are, passes that walk them have no more invocations.
+    for Dispatch { kernel, wave } in &deep {
+        let counts = [None, Some(3), Some(99)].map(|most| kernel.invocations(wave, most));
+        let listed = if kernel.per_invocation == 1 { [10, 3, 10] } else { [64; 3] };
+        let expected = if wave.path_list == 0 { [counts[0]; 3] } else { listed };
+        assert_eq!(counts, expected, "{}", kernel.shader);
+    }
     // Cohorts keep second vertices of all paths, and connect the first ones of all.
     let cohorts = order(&listed(shared(3)), &mis(), wave(0, 1));
     assert_eq!(walked(&cohorts), [("sample", 3), ("shadow", 3)]);

@@ -1,6 +1,9 @@
 //! Recording and submission of command buffers.
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use ash::vk;
 
@@ -89,7 +92,7 @@ impl Commands {
 
     /// Records one pass: a compute dispatch of at least `invocations` invocations that sees all
     /// writes of earlier passes. It is labelled with the pipeline's name and, in a timed command
-    /// buffer, bracketed by timestamps.
+    /// buffer, timed.
     ///
     /// Binds those of `sets` that the shader uses; `push_constants` may be empty.
     ///
@@ -117,7 +120,7 @@ impl Commands {
             vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE,
         );
         if let Some(timestamps) = &mut self.timestamps {
-            timestamps.start(pipeline.name());
+            timestamps.start(pipeline.name(), invocations);
         }
         // SAFETY: the command buffer is recording; pipeline, layout and sets belong to the device
         // and the caller keeps them alive until the submission has been waited for.
@@ -158,6 +161,7 @@ impl Commands {
 
     /// Fills the first `bytes`, a positive multiple of 4, with a repeated word, after earlier use.
     pub(crate) fn fill_start(&mut self, buffer: &Buffer, bytes: u64, word: u32) {
+        self.interrupt_times();
         self.barrier(vk::PipelineStageFlags::TRANSFER, vk::AccessFlags::TRANSFER_WRITE);
         // SAFETY: recording; the buffer has transfer usage and the caller keeps it alive.
         unsafe {
@@ -174,6 +178,7 @@ impl Commands {
         to_offset: u64,
         size: u64,
     ) {
+        self.interrupt_times();
         self.barrier(
             vk::PipelineStageFlags::TRANSFER,
             vk::AccessFlags::TRANSFER_READ | vk::AccessFlags::TRANSFER_WRITE,
@@ -187,6 +192,13 @@ impl Commands {
     /// Makes everything written so far readable by the host once the submission has finished.
     pub(crate) fn make_visible_to_host(&mut self) {
         self.barrier(vk::PipelineStageFlags::HOST, vk::AccessFlags::HOST_READ);
+    }
+
+    /// Keeps the commands that follow out of the time of any pass.
+    fn interrupt_times(&mut self) {
+        if let Some(timestamps) = &mut self.timestamps {
+            timestamps.interrupt();
+        }
     }
 
     /// Lets everything written so far be seen by `access` in the stages `next`.
@@ -213,6 +225,7 @@ impl Commands {
         };
         // Held until the work is done: see `Device::queue`.
         let queue = self.device.queue();
+        let start = Instant::now();
         // SAFETY: recording ends here, the queue is locked, and the callers keep every object that
         // the commands use alive until the wait ends.
         unsafe {
@@ -241,8 +254,9 @@ impl Commands {
                 Err(result) => return Err(failed("vkWaitForFences", result)),
             }
         }
+        let took = start.elapsed();
         drop(queue);
-        self.timestamps.as_ref().map_or_else(|| Ok(PassTimes::new()), Timestamps::read)
+        self.timestamps.as_ref().map_or_else(|| Ok(PassTimes::new()), |times| times.read(took))
     }
 }
 

@@ -115,7 +115,7 @@ impl HostTracer {
         })
     }
 
-    /// Answers what a pass asks about the rays of a wave.
+    /// Answers what a pass asks about the rays of a wave. Returns the number of paths that it walked.
     ///
     /// # Errors
     /// The host does not share the memory of a buffer.
@@ -124,7 +124,7 @@ impl HostTracer {
         question: Question,
         wave: &Wave,
         answers: &Answers<'_>,
-    ) -> Result<()> {
+    ) -> Result<u32> {
         let paths = ListedPaths::new(wave, answers.path_lists)?;
         let passages = self.passages.as_ref().map(Passages::open).transpose()?;
         let rays = Rays { tree: &self.tree, passages: passages.as_ref() };
@@ -153,7 +153,7 @@ impl HostTracer {
                 paths.for_each_chunk(|paths| visible.answer(paths));
             }
         }
-        Ok(())
+        Ok(paths.count as u32)
     }
 }
 
@@ -377,7 +377,7 @@ impl<'a> ListedPaths<'a> {
     /// Calls `walk` with all paths, some at a time, on all cores.
     fn for_each_chunk(&self, walk: impl Fn(&mut dyn Iterator<Item = u32>) + Sync) {
         let size = (self.count / TURNS).clamp(LEAST_PATHS, MOST_PATHS);
-        (0..self.count.div_ceil(size)).into_par_iter().for_each(|chunk| {
+        let walk_chunk = |chunk: usize| {
             let places = chunk * size..self.count.min((chunk + 1) * size);
             match self.list {
                 None => walk(&mut places.map(|place| place as u32)),
@@ -385,6 +385,13 @@ impl<'a> ListedPaths<'a> {
                     walk(&mut list[places].iter().map(|path| path.load(Ordering::Relaxed)));
                 }
             }
-        });
+        };
+        let chunks = 0..self.count.div_ceil(size);
+        // Waking other threads takes longer than to follow few rays.
+        if chunks.len() <= 1 {
+            chunks.for_each(walk_chunk);
+        } else {
+            chunks.into_par_iter().for_each(walk_chunk);
+        }
     }
 }

@@ -70,14 +70,16 @@ impl Kernel {
         self.question != Some(Question::Visible)
     }
 
-    /// Number of invocations for a wave; at least one, so that an empty wave makes drivers compile.
-    pub fn invocations(&self, wave: &Wave) -> u32 {
+    /// Number of invocations for a wave whose lists hold `most_listed` paths at most, where the host knows
+    /// that; at least one, so that an empty wave makes drivers compile.
+    pub fn invocations(&self, wave: &Wave, most_listed: Option<u32>) -> u32 {
+        let all = wave.pixel_count * wave.sample_count;
+        let listed = most_listed.filter(|_| wave.path_list != 0);
+        let paths = listed.map_or(all, |most| most.min(all));
         let elements = match self.domain {
-            Domain::Paths | Domain::Arrivals | Domain::Surfaces => {
-                wave.pixel_count * wave.sample_count
-            }
+            Domain::Paths | Domain::Arrivals | Domain::Surfaces => paths,
             Domain::Pixels => wave.pixel_count,
-            Domain::ShadowRays => wave.pixel_count * wave.sample_count * wave.shadow_ray_count,
+            Domain::ShadowRays => paths * wave.shadow_ray_count,
         };
         if self.per_invocation == 1 {
             return elements.max(1);
@@ -118,10 +120,17 @@ impl Pass {
         &self.kernel
     }
 
-    /// Records the dispatch over `wave`, binding those of `sets` that its shader uses.
-    pub fn record(&self, commands: &mut Commands, sets: &[&DescriptorSet], wave: &Wave) {
+    /// Records the dispatch over `wave`, binding those of `sets` that its shader uses, with as many invocations
+    /// as [`Kernel::invocations`] says.
+    pub fn record(
+        &self,
+        commands: &mut Commands,
+        sets: &[&DescriptorSet],
+        wave: &Wave,
+        most_listed: Option<u32>,
+    ) {
         if let Some(pipeline) = &self.pipeline {
-            let invocations = self.kernel.invocations(wave);
+            let invocations = self.kernel.invocations(wave, most_listed);
             commands.dispatch(pipeline, sets, bytemuck::bytes_of(wave), invocations);
         }
     }

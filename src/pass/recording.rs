@@ -24,6 +24,8 @@ pub struct Recording<'a> {
     times: PassTimes,
     host: Option<Host<'a>>,
     ends: bool,
+    /// Most paths of the lists from here on: those of the last question.
+    most_listed: Option<u32>,
 }
 
 impl<'a> Recording<'a> {
@@ -39,7 +41,8 @@ impl<'a> Recording<'a> {
         ends: bool,
     ) -> Result<Self> {
         let commands = Commands::begin_timed(device, most_passes)?;
-        Ok(Self { device, commands, most_passes, times: PassTimes::new(), host, ends })
+        let times = PassTimes::new();
+        Ok(Self { device, commands, most_passes, times, host, ends, most_listed: None })
     }
 
     /// Adds a pass. If it asks the host, waits for all before and lets the host answer first. Returns false,
@@ -59,11 +62,11 @@ impl<'a> Recording<'a> {
             if may_end && !answers.has_rays(wave)? {
                 return Ok(false);
             }
-            tracer.answer(question, wave, answers)?;
+            self.most_listed = Some(tracer.answer(question, wave, answers)?);
             let ms = start.elapsed().as_secs_f64() * 1e3;
             *self.times.entry(pass.kernel().shader.to_owned()).or_default() += ms;
         }
-        pass.record(&mut self.commands, sets, wave);
+        pass.record(&mut self.commands, sets, wave, self.most_listed);
         Ok(true)
     }
 

@@ -14,7 +14,7 @@ use super::{
     compilers::{COMPILATION, Compilers},
     film_buffers::{BLOCK_PIXELS, FilmBuffers, padded_pixels},
     kernel::{Dispatch, Domain, Kernel, Pass},
-    order::{FEATURES, PassSettings, PathLists, WaveOrder, wave_order},
+    order::{FEATURES, PassSettings, PathLists, wave_order},
     recording::Recording,
     scene_buffers::SceneBuffers,
     sharing_buffers::SharingBuffers,
@@ -159,7 +159,7 @@ impl Runner {
             let mut commands = Commands::begin(&self.device)?;
             let film = self.film.set(0);
             let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
-            pass.record(&mut commands, &sets, wave);
+            pass.record(&mut commands, &sets, wave, None);
             commands.submit_and_wait()?;
             self.add_compile_ms(kernel.shader, start);
             self.passes.insert(kernel.clone(), pass);
@@ -278,21 +278,25 @@ impl Runner {
         let film_start = self.film.first_pixel(wave.first_pixel);
         let wave = Wave { film_start, ..wave };
         let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
-        let WaveOrder { vertices, end } = wave_order(&settings, technique.steps(), wave, vertices);
+        let order = wave_order(&settings, technique.steps(), wave, vertices);
         let tracer = self.scene.geometry().host_tracer();
         let answers = || self.waves.answers(self.scene.parameters());
         let host = tracer.map(|tracer| (tracer, answers()));
         let pages = if accumulates { self.accumulated().count() } else { 0 };
         let accumulation = self.accumulation();
         made(&mut self.passes, &self.device, accumulation)?;
-        let most_passes = (vertices.len() + end.len() + pages) as u32;
+        let of_vertices = order.vertices.len();
+        let dispatches = order.all();
+        // Drivers make and reset all queries of a submission.
+        let asks = |dispatch: &Dispatch| host.is_some() && dispatch.kernel.question.is_some();
+        let between_questions = dispatches.split(asks).map(|passes| passes.len() + 1).max();
+        let most_passes = (between_questions.unwrap_or(0) + pages) as u32;
         let ends = self.settings.path_lists != PathLists::Never;
         let mut recording = Recording::begin(&self.device, most_passes, host, ends)?;
         let film = self.film.set(wave.first_pixel);
         let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
         let mut lives = true;
-        let of_vertices = vertices.len();
-        for (place, Dispatch { kernel, wave }) in vertices.into_iter().chain(end).enumerate() {
+        for (place, Dispatch { kernel, wave }) in dispatches.into_iter().enumerate() {
             if !lives && place < of_vertices {
                 continue;
             }
