@@ -17,13 +17,16 @@ use crate::{
     memory,
 };
 
-/// A named storage buffer in device memory.
-pub struct Buffer {
-    pub(super) raw: vk::Buffer,
+/// A named storage buffer in device memory, which lives as long as any of its clones.
+#[derive(Clone)]
+pub struct Buffer(Arc<Owned>);
+
+struct Owned {
+    raw: vk::Buffer,
     size: u64,
     name: String,
     allocation: Option<Allocation>,
-    pub(super) device: Arc<Device>,
+    device: Arc<Device>,
 }
 
 impl Buffer {
@@ -79,8 +82,9 @@ impl Buffer {
         // SAFETY: `raw` was just created from this device.
         let requirements = unsafe { device.raw.get_buffer_memory_requirements(raw) };
         // From here on `Drop` cleans up.
-        let mut buffer =
-            Self { raw, size, name: name.to_owned(), allocation: None, device: Arc::clone(device) };
+        let (name, device) = (name.to_owned(), Arc::clone(device));
+        let mut owned = Owned { raw, size, name, allocation: None, device };
+        let (name, device) = (&owned.name, &owned.device);
         let allocation = device
             .allocator()
             .as_mut()
@@ -102,19 +106,27 @@ impl Buffer {
         // SAFETY: the allocation was made for this buffer's requirements and is bound once.
         unsafe { device.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) }
             .map_err(|result| failed_buffer(&asker(), size, "vkBindBufferMemory", result))?;
-        buffer.allocation = Some(allocation);
         labels::name_object(device, raw, name);
-        Ok(buffer)
+        owned.allocation = Some(allocation);
+        Ok(Self(Arc::new(owned)))
+    }
+
+    pub(super) fn raw(&self) -> vk::Buffer {
+        self.0.raw
+    }
+
+    pub(super) fn device(&self) -> &Arc<Device> {
+        &self.0.device
     }
 
     /// Size in bytes.
     pub(crate) fn size(&self) -> u64 {
-        self.size
+        self.0.size
     }
 
     /// Name shown by debug tools and memory reports.
     pub(crate) fn name(&self) -> &str {
-        &self.name
+        &self.0.name
     }
 
     /// Returns the words of a buffer whose memory the host shares with the device, as software devices do.
@@ -123,29 +135,30 @@ impl Buffer {
     /// # Errors
     /// The host does not see the memory.
     pub(crate) fn words(&self) -> Result<&[AtomicU32]> {
-        let start = self.allocation.as_ref().and_then(Allocation::mapped_ptr);
+        let start = self.0.allocation.as_ref().and_then(Allocation::mapped_ptr);
         let start = start.ok_or_else(|| self.unmapped())?.cast::<AtomicU32>();
         // SAFETY: the allocation is mapped as long as it lives, which is as long as `self`; it is aligned
         // for storage buffers and holds `size` bytes, a multiple of 4. Any bits are a word, and threads
         // of the host share atomic words. Submissions are waited for, so the device is not at work.
-        Ok(unsafe { slice::from_raw_parts(start.as_ptr(), (self.size / 4) as usize) })
+        Ok(unsafe { slice::from_raw_parts(start.as_ptr(), (self.size() / 4) as usize) })
     }
 
-    /// Returns the memory of a buffer that the host sees.
+    /// Returns the memory of a buffer that the host sees and that has no clones.
     pub(super) fn mapped(&mut self) -> Result<&mut [u8]> {
         let error = self.unmapped();
-        self.allocation.as_mut().and_then(Allocation::mapped_slice_mut).ok_or(error)
+        let allocation = Arc::get_mut(&mut self.0).and_then(|owned| owned.allocation.as_mut());
+        allocation.and_then(Allocation::mapped_slice_mut).ok_or(error)
     }
 
     fn unmapped(&self) -> Error {
         Error::Vulkan {
-            call: format!("mapping of {}", self.name),
+            call: format!("mapping of {}", self.name()),
             result: "memory is not visible to the host".into(),
         }
     }
 }
 
-impl Drop for Buffer {
+impl Drop for Owned {
     fn drop(&mut self) {
         // SAFETY: every submission has been waited for, so the device no longer uses the buffer.
         unsafe { self.device.raw.destroy_buffer(self.raw, None) };

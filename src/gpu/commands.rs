@@ -165,7 +165,7 @@ impl Commands {
         self.barrier(vk::PipelineStageFlags::TRANSFER, vk::AccessFlags::TRANSFER_WRITE);
         // SAFETY: recording; the buffer has transfer usage and the caller keeps it alive.
         unsafe {
-            self.device.raw.cmd_fill_buffer(self.raw, buffer.raw, 0, bytes, word);
+            self.device.raw.cmd_fill_buffer(self.raw, buffer.raw(), 0, bytes, word);
         }
     }
 
@@ -186,7 +186,7 @@ impl Commands {
         let region =
             vk::BufferCopy::default().src_offset(from_offset).dst_offset(to_offset).size(size);
         // SAFETY: recording; both buffers have transfer usage and the caller keeps them alive.
-        unsafe { self.device.raw.cmd_copy_buffer(self.raw, from.raw, to.raw, &[region]) };
+        unsafe { self.device.raw.cmd_copy_buffer(self.raw, from.raw(), to.raw(), &[region]) };
     }
 
     /// Makes everything written so far readable by the host once the submission has finished.

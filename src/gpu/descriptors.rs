@@ -30,14 +30,14 @@ pub struct DescriptorSet {
     pool: vk::DescriptorPool,
     pub(super) raw: vk::DescriptorSet,
     views: Vec<vk::BufferView>,
-    buffer_bytes: BTreeMap<String, u64>,
+    /// Kept, since the set refers to them.
+    buffers: Vec<Buffer>,
     table: &'static BindingTable,
     device: Arc<Device>,
 }
 
 impl DescriptorSet {
-    /// Creates a set of `table` with `buffers` at their bindings. The buffers must outlive every
-    /// submission that uses the set.
+    /// Creates a set of `table` with `buffers` at their bindings.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if a call fails, [`Error::Device`] if a texel buffer has more texels than
@@ -59,10 +59,7 @@ impl DescriptorSet {
             pool,
             raw: vk::DescriptorSet::null(),
             views: Vec::new(),
-            buffer_bytes: buffers
-                .iter()
-                .map(|(_, buffer)| (buffer.name().to_owned(), buffer.size()))
-                .collect(),
+            buffers: buffers.iter().map(|(_, buffer)| (*buffer).clone()).collect(),
             table,
             device: Arc::clone(device),
         };
@@ -75,7 +72,7 @@ impl DescriptorSet {
         labels::name_object(device, set.raw, table.name);
         for (binding, buffer) in buffers {
             let info =
-                [vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(vk::WHOLE_SIZE)];
+                [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)];
             let mut view = [vk::BufferView::null()];
             let write = vk::WriteDescriptorSet::default()
                 .dst_set(set.raw)
@@ -128,7 +125,7 @@ impl DescriptorSet {
             });
         }
         let info = vk::BufferViewCreateInfo::default()
-            .buffer(buffer.raw)
+            .buffer(buffer.raw())
             .format(vulkan_format(format))
             .range(texels * texel_bytes);
         // SAFETY: the buffer is alive, has texel-buffer usage and holds that many texels.
@@ -140,8 +137,8 @@ impl DescriptorSet {
     }
 
     /// Bytes of the buffers in the set by their names.
-    pub fn buffer_bytes(&self) -> &BTreeMap<String, u64> {
-        &self.buffer_bytes
+    pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
+        self.buffers.iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
     }
 
     /// Returns true if the set has a buffer with this number.

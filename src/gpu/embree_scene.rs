@@ -35,7 +35,7 @@ const VERTEX_BYTES: usize = 16;
 #[derive(Clone)]
 pub(crate) enum Vertices {
     /// In a buffer whose memory the host shares.
-    Shared(Arc<Buffer>),
+    Shared(Buffer),
     /// In the world, and one vertex more, since the library reads beyond the last.
     Own(Arc<Vec<[f32; 3]>>),
 }

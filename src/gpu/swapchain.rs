@@ -302,7 +302,7 @@ impl Swapchain {
             );
             raw.cmd_copy_buffer_to_image(
                 commands.raw,
-                pixels.raw,
+                pixels.raw(),
                 image,
                 vk::ImageLayout::TRANSFER_DST_OPTIMAL,
                 &[region],

@@ -21,8 +21,8 @@ const SHARED_BYTES: usize = 1 << 20;
 const WORDS_TOGETHER: usize = 1 << 14;
 
 impl Buffer {
-    /// Creates a buffer that holds `data` and is read only as a uniform texel buffer, so the limit
-    /// on storage buffers does not apply. The descriptor set checks the number of texels.
+    /// Creates a buffer that holds `data`, or one element of zeros, and is read only as a uniform texel
+    /// buffer, so the limit on storage buffers does not apply. The descriptor set checks the number of texels.
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if memory runs out.
@@ -31,7 +31,8 @@ impl Buffer {
         name: &str,
         data: &[T],
     ) -> Result<Self> {
-        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let none = [T::zeroed()];
+        let bytes: &[u8] = bytemuck::cast_slice(if data.is_empty() { &none } else { data });
         let buffer = Self::with_location(
             device,
             name,
@@ -45,12 +46,13 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// Creates a storage buffer that holds `data`.
+    /// Creates a storage buffer that holds `data`, or one element of zeros.
     ///
     /// # Errors
     /// As [`Buffer::new`].
     pub fn from_slice<T: Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
-        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let none = [T::zeroed()];
+        let bytes: &[u8] = bytemuck::cast_slice(if data.is_empty() { &none } else { data });
         let buffer = Self::new(device, name, bytes.len() as u64)?;
         buffer.upload(bytes)?;
         Ok(buffer)
@@ -62,10 +64,15 @@ impl Buffer {
     /// As [`Buffer::new`].
     pub fn zeroed(device: &Arc<Device>, name: &str, size: u64) -> Result<Self> {
         let buffer = Self::new(device, name, size)?;
-        let mut commands = Commands::begin(device)?;
-        commands.fill(&buffer, 0);
-        commands.submit_and_wait()?;
+        buffer.clear()?;
         Ok(buffer)
+    }
+
+    /// Sets everything to zero. Fails if the device does.
+    pub(crate) fn clear(&self) -> Result<()> {
+        let mut commands = Commands::begin(self.device())?;
+        commands.fill(self, 0);
+        commands.submit_and_wait().map(drop)
     }
 
     /// Copies `bytes` into the buffer, from its start.
@@ -80,12 +87,12 @@ impl Buffer {
         if bytes.is_empty() {
             return Ok(());
         }
-        if self.device.capabilities().is_software() {
+        if self.device().capabilities().is_software() {
             store(bytes, self.words()?);
             return Ok(());
         }
         let mut staging = Self::with_location(
-            &self.device,
+            self.device(),
             "staging (upload)",
             bytes.len().min(STAGING_BYTES) as u64,
             MemoryLocation::CpuToGpu,
@@ -93,7 +100,7 @@ impl Buffer {
         )?;
         for (index, piece) in bytes.chunks(STAGING_BYTES).enumerate() {
             staging.mapped()?[..piece.len()].copy_from_slice(piece);
-            let mut commands = Commands::begin(&self.device)?;
+            let mut commands = Commands::begin(self.device())?;
             commands.copy(
                 &staging,
                 0,
@@ -136,7 +143,7 @@ impl Buffer {
         if bytes == 0 {
             return Ok(());
         }
-        if self.device.capabilities().is_software() && size_of::<T>().is_multiple_of(4) {
+        if self.device().capabilities().is_software() && size_of::<T>().is_multiple_of(4) {
             let mut piece = vec![T::zeroed(); length.min((SHARED_BYTES / size_of::<T>()).max(1))];
             let words = &self.words()?[..bytes / 4];
             for words in words.chunks(size_of_val(&piece[..]) / 4) {
@@ -147,7 +154,7 @@ impl Buffer {
         }
         let longest = STAGING_BYTES / size_of::<T>() * size_of::<T>();
         let mut staging = Self::with_location(
-            &self.device,
+            self.device(),
             "staging (download)",
             bytes.min(longest) as u64,
             MemoryLocation::GpuToCpu,
@@ -155,7 +162,7 @@ impl Buffer {
         )?;
         for first in (0..bytes).step_by(longest) {
             let piece = longest.min(bytes - first);
-            let mut commands = Commands::begin(&self.device)?;
+            let mut commands = Commands::begin(self.device())?;
             let copied = piece.next_multiple_of(4) as u64;
             commands.copy(self, first as u64, &staging, 0, copied);
             commands.make_visible_to_host();

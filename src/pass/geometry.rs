@@ -9,7 +9,7 @@ use super::{
     surfaces::Surfaces,
 };
 use crate::{
-    accel::{Accel, MAX_TRIANGLE_PAGES, TriangleRecord, instances::Record},
+    accel::{Accel, MAX_TRIANGLE_PAGES, TriangleRecord},
     error::{Error, Result},
     gpu::{Buffer, Capabilities, Device},
     shader::{
@@ -27,8 +27,8 @@ const PAGES: [Binding; MAX_TRIANGLE_PAGES] =
 /// Tree and triangles on the device.
 pub struct GeometryBuffers {
     nodes: Buffer,
-    pages: Vec<Arc<Buffer>>,
-    materials: Arc<Buffer>,
+    pages: Vec<Buffer>,
+    materials: Buffer,
     instances: Buffer,
     page_shift: u32,
     is_instanced: bool,
@@ -53,21 +53,14 @@ impl GeometryBuffers {
             .iter()
             .enumerate()
             .map(|(index, page): (usize, &Vec<TriangleRecord>)| {
-                Buffer::texels_from_slice(device, &format!("triangles {index}"), page).map(Arc::new)
+                Buffer::texels_from_slice(device, &format!("triangles {index}"), page)
             })
             .collect::<Result<_>>()?;
-        // A buffer has at least one element.
-        let none = [Record::default()];
-        let instances = if accel.is_instanced() { &accel.instances[..] } else { &none };
         Ok(Self {
             nodes: Buffer::texels_from_slice(device, "BVH nodes", &accel.nodes)?,
             pages,
-            materials: Arc::new(Buffer::from_slice(
-                device,
-                "triangle materials",
-                &accel.triangle_materials,
-            )?),
-            instances: Buffer::texels_from_slice(device, "instances", instances)?,
+            materials: Buffer::from_slice(device, "triangle materials", &accel.triangle_materials)?,
+            instances: Buffer::texels_from_slice(device, "instances", &accel.instances)?,
             page_shift: accel.page_shift,
             is_instanced: accel.is_instanced(),
             host_tracer: None,
@@ -90,7 +83,7 @@ impl GeometryBuffers {
         let passages = passing.map(|surfaces| Passages {
             pages: self.pages.clone(),
             page_shift: self.page_shift,
-            triangle_materials: Arc::clone(&self.materials),
+            triangle_materials: self.materials.clone(),
             instances: accel.instances.clone(),
             surfaces,
         });
@@ -112,21 +105,14 @@ impl GeometryBuffers {
 
     /// Returns the buffers with their bindings in the scene set. Missing pages repeat the first.
     pub fn bindings(&self) -> Vec<(Binding, &Buffer)> {
-        let page =
-            |(index, binding)| (binding, self.pages.get(index).unwrap_or(&self.pages[0]).as_ref());
+        let page = |(index, binding)| (binding, self.pages.get(index).unwrap_or(&self.pages[0]));
         let mut bindings = vec![
             (scene::BVH_NODES, &self.nodes),
-            (scene::TRIANGLE_MATERIALS, self.materials.as_ref()),
+            (scene::TRIANGLE_MATERIALS, &self.materials),
             (scene::INSTANCES, &self.instances),
         ];
         bindings.extend(PAGES.into_iter().enumerate().map(page));
         bindings
-    }
-
-    /// Returns every buffer once, for memory reports.
-    pub(crate) fn buffers(&self) -> impl Iterator<Item = &Buffer> {
-        let pages = self.pages.iter().map(Arc::as_ref);
-        [&self.nodes, self.materials.as_ref(), &self.instances].into_iter().chain(pages)
     }
 
     /// Returns the specialization of the passes that traverse this geometry.

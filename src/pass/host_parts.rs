@@ -56,7 +56,7 @@ pub(super) fn check_copies(accel: &Accel) -> Result<()> {
 /// Memory does not suffice.
 pub(super) fn parts(
     accel: &Accel,
-    pages: &[Arc<Buffer>],
+    pages: &[Buffer],
     may_pass: &dyn Fn(u32) -> bool,
 ) -> Result<Vec<Part>> {
     if !accel.is_instanced() {
@@ -83,7 +83,7 @@ pub(super) fn parts(
 /// Triangles in the buffers of the device, those that stop all light and others.
 fn shared_parts(
     accel: &Accel,
-    pages: &[Arc<Buffer>],
+    pages: &[Buffer],
     triangles: Range<u32>,
     instance: u32,
     may_pass: &dyn Fn(u32) -> bool,
@@ -96,7 +96,7 @@ fn shared_parts(
             let triangles = (first.max(triangles.start)..end).filter(|&triangle| {
                 may_pass(accel.triangle_materials[triangle as usize]) == is_passing
             });
-            let vertices = Vertices::Shared(Arc::clone(page));
+            let vertices = Vertices::Shared(page.clone());
             parts.push(Part::new(vertices, first, instance, is_passing, triangles));
         }
     }

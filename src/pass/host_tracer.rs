@@ -97,7 +97,7 @@ impl HostTracer {
     pub(super) fn new(
         embree: &Arc<Embree>,
         accel: &Accel,
-        pages: &[Arc<Buffer>],
+        pages: &[Buffer],
         passages: Option<Passages>,
         must_trace: bool,
     ) -> Result<Self> {

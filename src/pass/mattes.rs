@@ -6,7 +6,7 @@ use crate::{
     scene::Scene,
 };
 
-/// Identifiers as the pass `mattes` reads them; none of the lists is empty.
+/// Identifiers as the pass `mattes` reads them.
 pub(super) struct Mattes {
     /// By triangle in BVH order; those of meshes that instances place mean nothing.
     pub triangle_objects: Vec<u32>,
@@ -31,15 +31,11 @@ impl Mattes {
         let of_instance = |instance: usize| {
             of(geometry.objects.partition_point(|start| start.first_instance <= instance))
         };
-        let mut triangle_objects: Vec<u32> =
-            accel.scene_triangles.iter().map(of_triangle).collect();
-        let mut instance_objects: Vec<u32> =
-            (0..geometry.instances.len()).map(of_instance).collect();
-        // A buffer has at least one element.
-        triangle_objects.resize(triangle_objects.len().max(1), 0);
-        instance_objects.resize(instance_objects.len().max(1), 0);
-        let materials = &scene.materials;
-        let materials = materials.iter().map(|own| cryptomatte::identifier(&own.name)).collect();
-        Self { triangle_objects, instance_objects, materials }
+        let materials = scene.materials.iter();
+        Self {
+            triangle_objects: accel.scene_triangles.iter().map(of_triangle).collect(),
+            instance_objects: (0..geometry.instances.len()).map(of_instance).collect(),
+            materials: materials.map(|own| cryptomatte::identifier(&own.name)).collect(),
+        }
     }
 }

@@ -3,10 +3,7 @@
 
 use std::{
     mem::offset_of,
-    sync::{
-        Arc,
-        atomic::{AtomicU32, Ordering},
-    },
+    sync::atomic::{AtomicU32, Ordering},
 };
 
 use glam::Vec3;
@@ -51,8 +48,8 @@ pub struct PassingSurfaces {
     materials: Vec<Material>,
     surfaces: Vec<MaterialSurface>,
     uses: Vec<TextureUse>,
-    textures: Vec<Arc<Buffer>>,
-    attributes: Vec<Arc<Buffer>>,
+    textures: Vec<Buffer>,
+    attributes: Vec<Buffer>,
     access: TextureAccess,
     passes: Vec<bool>,
 }
@@ -83,9 +80,9 @@ impl PassingSurfaces {
 /// Triangles of a scene and their surfaces.
 pub(super) struct Passages {
     /// Triangles, three vertices each, in pages of `1 << page_shift`.
-    pub(super) pages: Vec<Arc<Buffer>>,
+    pub(super) pages: Vec<Buffer>,
     pub(super) page_shift: u32,
-    pub(super) triangle_materials: Arc<Buffer>,
+    pub(super) triangle_materials: Buffer,
     pub(super) instances: Vec<Record>,
     pub(super) surfaces: PassingSurfaces,
 }
@@ -120,9 +117,8 @@ struct Pages<'a> {
 }
 
 impl<'a> Pages<'a> {
-    fn open(buffers: &'a [Arc<Buffer>], shift: u32) -> Result<Self> {
-        let pages = buffers.iter().map(|buffer| buffer.words()).collect::<Result<_>>()?;
-        Ok(Self { pages, shift })
+    fn open(buffers: &'a [Buffer], shift: u32) -> Result<Self> {
+        Ok(Self { pages: buffers.iter().map(Buffer::words).collect::<Result<_>>()?, shift })
     }
 
     /// Page of an element, and its index there.

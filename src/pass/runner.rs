@@ -415,10 +415,10 @@ impl Runner {
 
     /// Device memory by buffer, bytes.
     pub(crate) fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        let mut bytes = self.scene.buffer_bytes();
-        bytes.extend(self.waves.buffer_bytes());
-        bytes.extend(self.sharing.iter().flat_map(SharingBuffers::buffer_bytes));
-        bytes.extend(self.film.buffer_bytes());
+        let mut bytes = self.film.buffer_bytes();
+        let sharing = self.sharing.iter().map(SharingBuffers::set);
+        let sets = [self.scene.set(), self.waves.set()].into_iter().chain(sharing);
+        bytes.extend(sets.flat_map(DescriptorSet::buffer_bytes));
         bytes
     }
 }

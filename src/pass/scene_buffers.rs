@@ -26,7 +26,7 @@ use crate::{
     shader::{
         bindings::{Binding, SCENE, scene as bindings},
         constants::{FILTER_BOX, FILTER_GAUSSIAN, SURFACES_INSTANCED, SURFACES_LAMP_CELLS},
-        structs::{self, SceneParameters},
+        structs::SceneParameters,
     },
     surface::SurfaceTables,
 };
@@ -35,9 +35,7 @@ use crate::{
 pub struct SceneBuffers {
     set: DescriptorSet,
     geometry: GeometryBuffers,
-    textures: TextureBuffers,
-    /// The first holds the [`SceneParameters`].
-    buffers: Vec<Buffer>,
+    parameter_buffer: Buffer,
     parameters: SceneParameters,
     surfaces: Surfaces,
     window: Window,
@@ -82,13 +80,6 @@ impl SceneBuffers {
     ) -> Result<Self> {
         let Parts { geometry, textures, lamps, lamp_cells, light_groups, tables, mattes } = parts;
         let mut host_ms = BTreeMap::new();
-        let mut buffers = Vec::new();
-        let mut places = Vec::new();
-        let mut add = |binding: Binding, buffer: Buffer| {
-            places.push(binding);
-            buffers.push(buffer);
-        };
-
         let material_kinds =
             tables.materials.iter().fold(0, |bits, material| bits | 1 << material.kind);
         let surfaces = Surfaces {
@@ -121,7 +112,7 @@ impl SceneBuffers {
         let names = ["compensated rows", "compensated cells"];
         let (compensated_rows, compensated_cells, compensated_total) =
             uploaded(compensated, names)?;
-        let mut lamp_cells = lamp_cells.unwrap_or_default();
+        let lamp_cells = lamp_cells.unwrap_or_default();
         let parameters = SceneParameters {
             lamp_count: lamps.source_count,
             lamp_grid_origin: lamp_cells.grid.origin.into(),
@@ -131,52 +122,39 @@ impl SceneBuffers {
             compensated_total,
             ..parameters(scene, map, total, window)
         };
-        add(bindings::PARAMETERS, Buffer::from_slice(device, "parameters", &[parameters])?);
-        add(bindings::ENVIRONMENT_TEXELS, texels);
-        add(bindings::ENVIRONMENT_ROWS, rows);
-        add(bindings::ENVIRONMENT_CELLS, cells);
-        add(bindings::COMPENSATED_ROWS, compensated_rows);
-        add(bindings::COMPENSATED_CELLS, compensated_cells);
-        let mut choices = lamps.choices;
-        let mut point_lamps = lamps.lamps;
-        let mut clusters = lamps.triangle_clusters;
-        // A buffer has at least one element.
-        clusters.resize(clusters.len().max(1), 0);
-        lamp_cells.lists.resize(lamp_cells.lists.len().max(1), 0);
-        let entries = &mut lamp_cells.entries;
-        entries.resize(entries.len().max(1), structs::LampEntry::default());
-        choices.resize(choices.len().max(1), structs::LampChoice::default());
-        point_lamps.resize(point_lamps.len().max(1), structs::Lamp::default());
-        add(bindings::LAMP_CHOICES, Buffer::from_slice(device, "lamp choices", &choices)?);
-        add(bindings::LAMPS, Buffer::from_slice(device, "lamps", &point_lamps)?);
-        add(bindings::LAMP_CELLS, Buffer::from_slice(device, "lamp cells", &lamp_cells.lists)?);
-        add(
-            bindings::LAMP_ENTRIES,
-            Buffer::from_slice(device, "lamp entries", &lamp_cells.entries)?,
-        );
-        add(bindings::LAMP_CLUSTERS, Buffer::from_slice(device, "lamp clusters", &clusters)?);
-        for (binding, name, identifiers) in [
-            (bindings::TRIANGLE_OBJECTS, "triangle objects", &mattes.triangle_objects),
-            (bindings::INSTANCE_OBJECTS, "instance objects", &mattes.instance_objects),
-            (bindings::MATERIAL_IDENTIFIERS, "material identifiers", &mattes.materials),
-        ] {
-            add(binding, Buffer::from_slice(device, name, identifiers)?);
-        }
-        let mut bound: Vec<_> =
-            places.into_iter().zip(&buffers).chain(geometry.bindings()).collect();
-        bound.extend(textures.bindings());
-        bound.push((bindings::MATERIALS, &materials));
-        bound.push((bindings::MATERIAL_TEXELS, &materials));
-        bound.push((bindings::BRDF_TABLE, &brdf_table));
-        bound.push((bindings::BRDF_CELLS, &brdf_table));
+        let parameter_buffer = Buffer::from_slice(device, "parameters", &[parameters])?;
+        let words = |name, words: &[u32]| Buffer::from_slice(device, name, words);
+        let own: [(Binding, Buffer); 18] = [
+            (bindings::PARAMETERS, parameter_buffer.clone()),
+            (bindings::ENVIRONMENT_TEXELS, texels),
+            (bindings::ENVIRONMENT_ROWS, rows),
+            (bindings::ENVIRONMENT_CELLS, cells),
+            (bindings::COMPENSATED_ROWS, compensated_rows),
+            (bindings::COMPENSATED_CELLS, compensated_cells),
+            (bindings::LAMP_CHOICES, Buffer::from_slice(device, "lamp choices", &lamps.choices)?),
+            (bindings::LAMPS, Buffer::from_slice(device, "lamps", &lamps.lamps)?),
+            (bindings::LAMP_CELLS, words("lamp cells", &lamp_cells.lists)?),
+            (
+                bindings::LAMP_ENTRIES,
+                Buffer::from_slice(device, "lamp entries", &lamp_cells.entries)?,
+            ),
+            (bindings::LAMP_CLUSTERS, words("lamp clusters", &lamps.triangle_clusters)?),
+            (bindings::TRIANGLE_OBJECTS, words("triangle objects", &mattes.triangle_objects)?),
+            (bindings::INSTANCE_OBJECTS, words("instance objects", &mattes.instance_objects)?),
+            (bindings::MATERIAL_IDENTIFIERS, words("material identifiers", &mattes.materials)?),
+            (bindings::MATERIALS, materials.clone()),
+            (bindings::MATERIAL_TEXELS, materials),
+            (bindings::BRDF_TABLE, brdf_table.clone()),
+            (bindings::BRDF_CELLS, brdf_table),
+        ];
+        let own = own.iter().map(|(binding, buffer)| (*binding, buffer));
+        let bound: Vec<_> = own.chain(geometry.bindings()).chain(textures.bindings()).collect();
         let set = DescriptorSet::new(device, &SCENE, &bound)?;
-        buffers.extend([materials, brdf_table]);
         host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
         Ok(Self {
             set,
             geometry,
-            textures,
-            buffers,
+            parameter_buffer,
             parameters,
             surfaces,
             window,
@@ -212,7 +190,7 @@ impl SceneBuffers {
 
     /// [`SceneParameters`].
     pub(crate) fn parameters(&self) -> &Buffer {
-        &self.buffers[0]
+        &self.parameter_buffer
     }
 
     /// Filter of the film.
@@ -241,16 +219,6 @@ impl SceneBuffers {
     /// Host milliseconds by stage: `bvh`, `upload`.
     pub(crate) fn host_ms(&self) -> &BTreeMap<String, f64> {
         &self.host_ms
-    }
-
-    /// Bytes by buffer name.
-    pub(crate) fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        self.buffers
-            .iter()
-            .chain(self.geometry.buffers())
-            .chain(self.textures.buffers())
-            .map(|buffer| (buffer.name().to_owned(), buffer.size()))
-            .collect()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Buffers for what the pixels of a cohort share.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::sync::Arc;
 
 use super::steps::PathDemand;
 use crate::{
@@ -15,7 +15,6 @@ use crate::{
 /// First and second vertices of one wave, and the connections between them.
 pub(crate) struct SharingBuffers {
     set: DescriptorSet,
-    buffers: [Buffer; 6],
 }
 
 impl SharingBuffers {
@@ -61,18 +60,11 @@ impl SharingBuffers {
             (sharing::SEEN, &seen),
             (sharing::SEEN_TEXELS, &seen),
         ];
-        let set = DescriptorSet::new(device, &SHARING, &bound)?;
-        let buffers = [first_vertices, second_vertices, offers, offer_weights, connections, seen];
-        Ok(Self { set, buffers })
+        Ok(Self { set: DescriptorSet::new(device, &SHARING, &bound)? })
     }
 
     /// Descriptor set 1 of the passes of sharing.
     pub(crate) fn set(&self) -> &DescriptorSet {
         &self.set
-    }
-
-    /// Bytes by buffer name.
-    pub(crate) fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        self.buffers.iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
     }
 }

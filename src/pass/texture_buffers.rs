@@ -35,8 +35,8 @@ const ATTRIBUTE_PAGES: [Binding; MAX_PAGES] = [
 /// Buffers that shaders read by `glsl/include/texture.glsl`. A scene without textures has buffers of one
 /// element, which no shader reads.
 pub(crate) struct TextureBuffers {
-    texture_pages: Vec<Arc<Buffer>>,
-    attribute_pages: Vec<Arc<Buffer>>,
+    texture_pages: Vec<Buffer>,
+    attribute_pages: Vec<Buffer>,
     uses: Buffer,
     surfaces: Buffer,
     access: TextureAccess,
@@ -69,9 +69,8 @@ impl TextureBuffers {
         let page_words = 1_u64 << shift;
         let texture_pages = (0..tables.textures.word_count().div_ceil(page_words).max(1))
             .map(|page| {
-                let mut words = tables.textures.words(page * page_words..(page + 1) * page_words);
-                words.resize(words.len().max(1), 0);
-                Buffer::texels_from_slice(device, &format!("textures {page}"), &words).map(Arc::new)
+                let words = tables.textures.words(page * page_words..(page + 1) * page_words);
+                Buffer::texels_from_slice(device, &format!("textures {page}"), &words)
             })
             .collect::<Result<Vec<_>>>()?;
         let words = if attributes.words.is_empty() { &[0] } else { &attributes.words[..] };
@@ -80,7 +79,6 @@ impl TextureBuffers {
             .enumerate()
             .map(|(page, words)| {
                 Buffer::texels_from_slice(device, &format!("triangle attributes {page}"), words)
-                    .map(Arc::new)
             })
             .collect::<Result<Vec<_>>>()?;
         let access = TextureAccess {
@@ -89,12 +87,10 @@ impl TextureBuffers {
             page_shift: shift,
             attributes: attributes.bits,
         };
-        let mut uses = tables.textures.uses.clone();
-        uses.resize_with(uses.len().max(1), Default::default);
         Ok(Self {
             texture_pages,
             attribute_pages,
-            uses: Buffer::from_slice(device, "texture uses", &uses)?,
+            uses: Buffer::from_slice(device, "texture uses", &tables.textures.uses)?,
             surfaces: Buffer::from_slice(device, "material surfaces", &tables.surfaces)?,
             access,
         })
@@ -109,20 +105,14 @@ impl TextureBuffers {
         for (names, pages) in
             [(TEXTURE_PAGES, &self.texture_pages), (ATTRIBUTE_PAGES, &self.attribute_pages)]
         {
-            let page = |(index, name)| (name, pages.get(index).unwrap_or(&pages[0]).as_ref());
+            let page = |(index, name)| (name, pages.get(index).unwrap_or(&pages[0]));
             bindings.extend(names.into_iter().enumerate().map(page));
         }
         bindings
     }
 
-    /// Returns every buffer once, for memory reports.
-    pub(crate) fn buffers(&self) -> impl Iterator<Item = &Buffer> {
-        let pages = self.pages().into_iter().flatten().map(Arc::as_ref);
-        [&self.uses, &self.surfaces].into_iter().chain(pages)
-    }
-
     /// Texels, and attributes of triangles.
-    pub(crate) fn pages(&self) -> [&[Arc<Buffer>]; 2] {
+    pub(crate) fn pages(&self) -> [&[Buffer]; 2] {
         [&self.texture_pages, &self.attribute_pages]
     }
 

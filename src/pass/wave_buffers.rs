@@ -1,6 +1,6 @@
 //! Buffers for the paths in flight.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::sync::Arc;
 
 use super::{host_tracer::Answers, steps::PathDemand, surfaces::Surfaces};
 use crate::{
@@ -39,13 +39,8 @@ pub struct WaveBuffers {
     shadow_rays: Buffer,
     visibility: Buffer,
     paths: Buffer,
-    surfaces: Buffer,
     instances: Buffer,
     path_lists: Buffer,
-    lamp_lists: Buffer,
-    features: Buffer,
-    group_radiance: Buffer,
-    lamp_groups: Buffer,
 }
 
 impl WaveBuffers {
@@ -127,13 +122,8 @@ impl WaveBuffers {
             shadow_rays,
             visibility,
             paths,
-            surfaces,
             instances,
             path_lists,
-            lamp_lists,
-            features,
-            group_radiance,
-            lamp_groups,
         })
     }
 
@@ -189,25 +179,5 @@ impl WaveBuffers {
             path_lists: &self.path_lists,
             parameters,
         }
-    }
-
-    /// Bytes by buffer name.
-    pub(crate) fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        [
-            &self.rays,
-            &self.hits,
-            &self.shadow_rays,
-            &self.visibility,
-            &self.paths,
-            &self.surfaces,
-            &self.instances,
-            &self.path_lists,
-            &self.lamp_lists,
-            &self.features,
-            &self.group_radiance,
-            &self.lamp_groups,
-        ]
-        .map(|buffer| (buffer.name().to_owned(), buffer.size()))
-        .into()
     }
 }

@@ -85,6 +85,6 @@ impl Room for Basic {
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let surfaces = context.runner.settings().surfaces;
         let steps = self.steps(context.parameters, surfaces)?;
-        Ok(Box::new(RayTechnique { steps, tables: None }))
+        Ok(Box::new(RayTechnique { steps, set: None }))
     }
 }

@@ -2,7 +2,7 @@
 //! supplies the pass, which draws a light direction and knows its density, and its constants.
 
 use crate::{
-    gpu::{Buffer, DescriptorSet},
+    gpu::DescriptorSet,
     pass::{Domain, Kernel, Passes, Roulette, Steps, Surfaces, Technique},
     shader::structs::Wave,
 };
@@ -80,8 +80,8 @@ impl Steps for RaySteps {
 pub struct RayTechnique {
     /// The steps.
     pub steps: RaySteps,
-    /// Descriptor set 1 and its buffers.
-    pub tables: Option<(DescriptorSet, Vec<Buffer>)>,
+    /// Descriptor set 1.
+    pub set: Option<DescriptorSet>,
 }
 
 impl Passes for RayTechnique {
@@ -90,7 +90,7 @@ impl Passes for RayTechnique {
     }
 
     fn set(&self) -> Option<&DescriptorSet> {
-        self.tables.as_ref().map(|(set, _)| set)
+        self.set.as_ref()
     }
 }
 

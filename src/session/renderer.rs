@@ -286,7 +286,7 @@ impl Renderer {
     /// Device memory by buffer, bytes.
     pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
         let mut bytes = self.runner.buffer_bytes();
-        bytes.extend(self.technique.set().iter().flat_map(|set| set.buffer_bytes().clone()));
+        bytes.extend(self.technique.set().iter().flat_map(|set| set.buffer_bytes()));
         bytes
     }
 

@@ -5,14 +5,13 @@ use std::sync::Arc;
 use super::records::RecordGrid;
 use crate::{
     error::Result,
-    gpu::{Buffer, Commands, DescriptorSet, Device},
+    gpu::{Buffer, DescriptorSet, Device},
     sampler::pilot::Tables,
     shader::rooms::control_variates,
 };
 
 /// The visibility records on a device.
 pub struct RecordBuffers {
-    device: Arc<Device>,
     set: DescriptorSet,
     grid: RecordGrid,
     counts: Buffer,
@@ -30,7 +29,7 @@ impl RecordBuffers {
             (control_variates::RECORD_VISIBILITIES, &visibilities),
         ];
         let set = DescriptorSet::new(device, &control_variates::TABLE, &bound)?;
-        Ok(Self { device: Arc::clone(device), set, grid, counts, visibilities })
+        Ok(Self { set, grid, counts, visibilities })
     }
 
     /// Reads rays and visible rays of every entry. Fails if the device does.
@@ -47,9 +46,7 @@ impl Tables for RecordBuffers {
     }
 
     fn forget(&self) -> Result<()> {
-        let mut commands = Commands::begin(&self.device)?;
-        commands.fill(&self.counts, 0);
-        commands.submit_and_wait().map(drop)
+        self.counts.clear()
     }
 
     fn freeze(&self) -> Result<()> {

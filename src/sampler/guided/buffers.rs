@@ -81,8 +81,6 @@ pub struct GuideBuffers {
     shares: Buffer,
     missing: Buffer,
     targets: Buffer,
-    #[expect(dead_code, reason = "the set binds it")]
-    path_cells: Buffer,
     arrivals: Option<ArrivalBuffers>,
     missing_slots: usize,
     rebuild_ms: f64,
@@ -183,7 +181,6 @@ impl GuideBuffers {
             shares,
             missing,
             targets,
-            path_cells,
             arrivals,
             missing_slots,
             rebuild_ms: 0.0,

@@ -43,8 +43,8 @@ impl Room for PortalRoom {
         let Context { scene, parameters, runner } = context;
         let count = scene.portals.len() as u32;
         let steps = steps(parameters, count, runner.settings().surfaces);
-        let (set, buffer) = upload(runner.device(), &scene.portals)?;
-        Ok(Box::new(RayTechnique { steps, tables: Some((set, vec![buffer])) }))
+        let set = Some(upload(runner.device(), &scene.portals)?);
+        Ok(Box::new(RayTechnique { steps, set }))
     }
 }
 
@@ -59,16 +59,13 @@ pub fn steps(parameters: &Parameters, count: u32, surfaces: Surfaces) -> RayStep
 }
 
 /// Makes descriptor set 1 of the portals.
-fn upload(device: &Arc<Device>, portals: &[Portal]) -> Result<(DescriptorSet, Buffer)> {
+fn upload(device: &Arc<Device>, portals: &[Portal]) -> Result<DescriptorSet> {
     let texels = |portal: &Portal| {
         let ([first, second], [width, height]) = (portal.axes, portal.size);
         [portal.corner.extend(width), first.extend(height), second.extend(0.0)]
             .map(|texel| texel.to_array())
     };
-    let mut words: Vec<[f32; 4]> = portals.iter().flat_map(texels).collect();
-    // A buffer has at least one element.
-    words.resize(words.len().max(1), [0.0; 4]);
+    let words: Vec<[f32; 4]> = portals.iter().flat_map(texels).collect();
     let buffer = Buffer::texels_from_slice(device, "portals", &words)?;
-    let set = DescriptorSet::new(device, &portal::TABLE, &[(portal::PORTALS, &buffer)])?;
-    Ok((set, buffer))
+    DescriptorSet::new(device, &portal::TABLE, &[(portal::PORTALS, &buffer)])
 }

@@ -8,21 +8,18 @@ use super::{
 };
 use crate::{
     error::Result,
-    gpu::{Buffer, Commands, DescriptorSet, Device},
+    gpu::{Buffer, DescriptorSet, Device},
     sampler::{pilot::Tables, regions::Partition},
     shader::rooms::tiles,
 };
 
 /// The cache on a device.
 pub struct TileBuffers {
-    device: Arc<Device>,
     set: DescriptorSet,
     grid: SectorGrid,
     cache: TileCache,
     counts: Buffer,
     entries: Buffer,
-    #[expect(dead_code, reason = "the set binds them")]
-    tables: [Buffer; 3],
 }
 
 impl TileBuffers {
@@ -37,22 +34,18 @@ impl TileBuffers {
         let counts = Buffer::new(device, "tile counts", bytes)?;
         let entries = Buffer::new(device, "tile entries", bytes)?;
         let (regions, aliases) = partition.tables();
-        let tables = [
-            Buffer::texels_from_slice(device, "tiles", &regions)?,
-            Buffer::texels_from_slice(device, "tile aliases", &aliases)?,
-            Buffer::texels_from_slice(device, "tile of cell", &partition.region_of_cell)?,
-        ];
-        let [regions, aliases, of_cell] = &tables;
+        let regions = Buffer::texels_from_slice(device, "tiles", &regions)?;
+        let aliases = Buffer::texels_from_slice(device, "tile aliases", &aliases)?;
+        let of_cell = Buffer::texels_from_slice(device, "tile of cell", &partition.region_of_cell)?;
         let bound = [
             (tiles::TILE_COUNTS, &counts),
             (tiles::TILE_ENTRIES, &entries),
-            (tiles::TILE_REGIONS, regions),
-            (tiles::TILE_ALIASES, aliases),
-            (tiles::TILE_OF_CELL, of_cell),
+            (tiles::TILE_REGIONS, &regions),
+            (tiles::TILE_ALIASES, &aliases),
+            (tiles::TILE_OF_CELL, &of_cell),
         ];
         let set = DescriptorSet::new(device, &tiles::TABLE, &bound)?;
-        let buffers =
-            Self { device: Arc::clone(device), set, grid, cache, counts, entries, tables };
+        let buffers = Self { set, grid, cache, counts, entries };
         buffers.forget()?;
         Ok(buffers)
     }
@@ -76,9 +69,7 @@ impl Tables for TileBuffers {
     }
 
     fn forget(&self) -> Result<()> {
-        let mut commands = Commands::begin(&self.device)?;
-        commands.fill(&self.counts, 0);
-        commands.submit_and_wait()?;
+        self.counts.clear()?;
         self.upload(&self.cache.untrained().repeat(self.grid.sectors()))
     }
 

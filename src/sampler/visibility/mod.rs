@@ -21,7 +21,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     film::Aov,
-    gpu::{Commands, DescriptorSet},
+    gpu::DescriptorSet,
     pass::{Passes, PathDemand, PixelReadback, Progress, Report, Runner, Steps, Technique},
 };
 
@@ -115,13 +115,8 @@ impl Technique for Visibility {
         Ok(if self.keeps_caches() { 1 } else { u32::MAX })
     }
 
-    fn restart(&mut self, runner: &mut Runner) -> Result<()> {
-        if self.keeps_caches() {
-            let mut commands = Commands::begin(runner.device())?;
-            commands.fill(self.lobes.caches(), 0);
-            commands.submit_and_wait()?;
-        }
-        Ok(())
+    fn restart(&mut self, _runner: &mut Runner) -> Result<()> {
+        if self.keeps_caches() { self.lobes.caches().clear() } else { Ok(()) }
     }
 
     fn check_resume(&self, samples: u32, progress: &Progress) -> Result<()> {
