@@ -107,39 +107,25 @@ impl ArrivingLight {
     pub(super) fn estimate(&self, tree: &Tree, of_environment: &[f32]) -> (Vec<f32>, Reflected) {
         let own = |cell: usize| &self.arrivals[cell * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS];
         // Sum over every inner cell and its descendants
-        let mut sums: Vec<Vec<Arrivals>> = vec![Vec::new(); tree.parents.len()];
-        for generation in tree.generations.iter().rev() {
-            let sum = |&cell: &usize| {
-                let mut sum = own(cell).to_vec();
-                for &child in &tree.children[cell] {
-                    let found = if sums[child].is_empty() { own(child) } else { &sums[child] };
-                    sum.iter_mut().zip(found).for_each(|(sum, found)| sum.add(*found));
-                }
-                sum
-            };
-            let found: Vec<Vec<Arrivals>> = generation.par_iter().map(sum).collect();
-            for (cell, found) in generation.iter().zip(found) {
-                sums[*cell] = found;
+        let sums = tree.up(|cell, sums: &[Vec<Arrivals>]| {
+            let mut sum = own(cell).to_vec();
+            for &child in &tree.children[cell] {
+                let found = if sums[child].is_empty() { own(child) } else { &sums[child] };
+                sum.iter_mut().zip(found).for_each(|(sum, found)| sum.add(*found));
             }
-        }
+            sum
+        });
         let mut scene = Arrivals::default();
         for sum in sums[..FACE_COUNT].iter().flatten() {
             scene.add(*sum);
         }
         let scene = [scene.light / scene.rays.max(1.0); ARRIVAL_DIRECTIONS];
         // Estimate the mean light of inner cells, parents first
-        let mut inner: Vec<Vec<f32>> = vec![Vec::new(); tree.parents.len()];
         let prior_of = |cell: usize| (cell >= FACE_COUNT).then(|| tree.parents[cell]);
-        for generation in &tree.generations {
-            let mean = |&cell: &usize| -> Vec<f32> {
-                let prior = prior_of(cell).map_or(&scene[..], |parent| &inner[parent]);
-                sums[cell].iter().zip(prior).map(|(sum, prior)| sum.mean(*prior)).collect()
-            };
-            let means: Vec<Vec<f32>> = generation.par_iter().map(mean).collect();
-            for (cell, means) in generation.iter().zip(means) {
-                inner[*cell] = means;
-            }
-        }
+        let inner = tree.down(|cell, inner: &[Vec<f32>]| {
+            let prior = prior_of(cell).map_or(&scene[..], |parent| &inner[parent]);
+            sums[cell].iter().zip(prior).map(|(sum, prior)| sum.mean(*prior)).collect()
+        });
         // Estimate the light of all cells by direction, and what they reflect of it
         let mut light = vec![0.0; self.arrivals.len()];
         let mut reflected = of_environment.to_vec();

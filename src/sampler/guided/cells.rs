@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use crate::sampler::{guided::key::CellKey, regions::FACE_COUNT};
 use crate::shader::rooms::guided::{GUIDE_PROBES, GUIDE_REFINED, GUIDE_SHARE_SHIFT};
 
@@ -30,6 +32,40 @@ pub(super) struct Tree {
     pub(super) children: Vec<Vec<usize>>,
     /// The faces, then all other cells with children and all coarse cells, level by level.
     pub(super) generations: Vec<Vec<usize>>,
+}
+
+impl Tree {
+    /// Computes `value` for the inner cells, generation by generation: parents first, each given what is
+    /// found so far. Leaves keep the default.
+    pub(super) fn down<T: Clone + Default + Send + Sync>(
+        &self,
+        value: impl Fn(usize, &[T]) -> T + Sync,
+    ) -> Vec<T> {
+        self.walk(self.generations.iter(), value)
+    }
+
+    /// As [`Self::down`], children first.
+    pub(super) fn up<T: Clone + Default + Send + Sync>(
+        &self,
+        value: impl Fn(usize, &[T]) -> T + Sync,
+    ) -> Vec<T> {
+        self.walk(self.generations.iter().rev(), value)
+    }
+
+    fn walk<'a, T: Clone + Default + Send + Sync>(
+        &self,
+        generations: impl Iterator<Item = &'a Vec<usize>>,
+        value: impl Fn(usize, &[T]) -> T + Sync,
+    ) -> Vec<T> {
+        let mut found = vec![T::default(); self.parents.len()];
+        for generation in generations {
+            let values: Vec<T> = generation.par_iter().map(|&cell| value(cell, &found)).collect();
+            for (cell, value) in generation.iter().zip(values) {
+                found[*cell] = value;
+            }
+        }
+        found
+    }
 }
 
 impl Cells {

@@ -82,50 +82,34 @@ impl Guide {
         for tally in tallies[..FACE_COUNT].iter().flatten() {
             scene.add(*tally);
         }
-        let mut inner = vec![Estimates::default(); self.cell_count()];
-        for generation in &tree.generations {
-            let estimate = |&cell: &usize| {
-                let tallies = &tallies[cell];
-                let parent = &inner[tree.parents[cell]];
-                if cell < FACE_COUNT {
-                    Estimates::of_face(cell, tallies, scene, tables)
-                } else if self.keys()[cell].is_coarse() {
-                    Estimates::of_coarse(tallies, parent)
-                } else {
-                    Estimates::of_fine(tallies, parent, tables)
-                }
-            };
-            let estimates: Vec<Estimates> = generation.par_iter().map(estimate).collect();
-            for (cell, estimates) in generation.iter().zip(estimates) {
-                inner[*cell] = estimates;
+        tree.down(|cell, inner: &[Estimates]| {
+            let tallies = &tallies[cell];
+            let parent = &inner[tree.parents[cell]];
+            if cell < FACE_COUNT {
+                Estimates::of_face(cell, tallies, scene, tables)
+            } else if self.keys()[cell].is_coarse() {
+                Estimates::of_coarse(tallies, parent)
+            } else {
+                Estimates::of_fine(tallies, parent, tables)
             }
-        }
-        inner
+        })
     }
 
     /// Sums the counts of every inner cell and its descendants; empty for the leaves.
     fn tallies(&self, tree: &Tree) -> Vec<Vec<Tally>> {
-        let mut tallies = vec![Vec::new(); self.cell_count()];
-        for generation in tree.generations.iter().rev() {
-            let sum = |&cell: &usize| -> Vec<Tally> {
-                let mut sum: Vec<Tally> = self.counts(cell).iter().map(Tally::from).collect();
-                for &child in &tree.children[cell] {
-                    if tallies[child].is_empty() {
-                        let counts = self.counts(child);
-                        sum.iter_mut().zip(counts).for_each(|(sum, count)| sum.add(count.into()));
-                    } else {
-                        let tallies = &tallies[child];
-                        sum.iter_mut().zip(tallies).for_each(|(sum, tally)| sum.add(*tally));
-                    }
+        tree.up(|cell, tallies: &[Vec<Tally>]| {
+            let mut sum: Vec<Tally> = self.counts(cell).iter().map(Tally::from).collect();
+            for &child in &tree.children[cell] {
+                if tallies[child].is_empty() {
+                    let counts = self.counts(child);
+                    sum.iter_mut().zip(counts).for_each(|(sum, count)| sum.add(count.into()));
+                } else {
+                    let tallies = &tallies[child];
+                    sum.iter_mut().zip(tallies).for_each(|(sum, tally)| sum.add(*tally));
                 }
-                sum
-            };
-            let sums: Vec<Vec<Tally>> = generation.par_iter().map(sum).collect();
-            for (cell, sum) in generation.iter().zip(sums) {
-                tallies[*cell] = sum;
             }
-        }
-        tallies
+            sum
+        })
     }
 
     /// Share of the BRDF of every cell, 256ths, 0 where the material decides. The prior of a cell
