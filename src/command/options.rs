@@ -48,7 +48,7 @@ impl DeviceOptions {
     /// # Errors
     /// As [`Device::open_traced`], and a device that fails the test.
     pub(crate) fn open(&self, validate: bool) -> Result<Arc<Device>> {
-        Device::open_checked(self.device.as_deref(), validate, self.tracer, self_test::check)
+        Device::open_checked(self.device.as_deref(), validate, self.tracer, None, self_test::check)
     }
 }
 

@@ -68,38 +68,15 @@ impl Device {
     /// # Errors
     /// Also [`Error::Device`] if the host is to trace and cannot.
     pub fn open_traced(wanted: Option<&str>, validate: bool, tracer: Tracer) -> Result<Arc<Self>> {
-        Self::open_checked(wanted, validate, tracer, |_| Ok(()))
+        Self::open_checked(wanted, validate, tracer, None, |_| Ok(()))
     }
 
     /// As [`Device::open_traced`], once `check` has let the device pass: drivers may crash as soon as it is
-    /// made.
+    /// made. For windows on `display` too, if there is one.
     ///
     /// # Errors
-    /// Also those of `check`.
+    /// Also those of `check`, and [`Error::Device`] if the device cannot show pictures in windows.
     pub(crate) fn open_checked(
-        wanted: Option<&str>,
-        validate: bool,
-        tracer: Tracer,
-        check: fn(&Capabilities) -> Result<()>,
-    ) -> Result<Arc<Self>> {
-        Self::open_with(wanted, validate, tracer, None, check)
-    }
-
-    /// As [`Device::open_checked`], for windows on `display` too.
-    ///
-    /// # Errors
-    /// Also [`Error::Device`] if the device cannot show pictures in windows.
-    pub(crate) fn open_for_display(
-        wanted: Option<&str>,
-        validate: bool,
-        tracer: Tracer,
-        display: RawDisplayHandle,
-        check: fn(&Capabilities) -> Result<()>,
-    ) -> Result<Arc<Self>> {
-        Self::open_with(wanted, validate, tracer, Some(display), check)
-    }
-
-    fn open_with(
         wanted: Option<&str>,
         validate: bool,
         tracer: Tracer,

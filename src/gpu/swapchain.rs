@@ -102,7 +102,7 @@ impl Swapchain {
         let instance = &self.device.instance;
         // SAFETY: the images of the old surface, if there was one, are gone. The handles are valid as long as
         // the window, which outlives the surface; the instance has the extensions of this display, which was
-        // given to `Device::open_for_display`.
+        // given to `Device::open_checked`.
         let surface = unsafe {
             self.surfaces.destroy_surface(self.surface, None);
             self.surface = vk::SurfaceKHR::null();

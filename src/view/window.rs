@@ -390,7 +390,7 @@ fn render(
 ) -> Result<()> {
     let Options { device: wanted, tracer, validate, check, settings, spp, tone, folder } = options;
     let display = window.display_handle().map_err(|error| no_window(&error))?.as_raw();
-    let device = Device::open_for_display(wanted.as_deref(), validate, tracer, display, check)?;
+    let device = Device::open_checked(wanted.as_deref(), validate, tracer, Some(display), check)?;
     let projector = Projector::new(&device, [scene.film.width, scene.film.height], inset::SIZE)?;
     let left = Side::new(&device, &scene, None, &settings, None)?;
     let panel = Panel::new(&device, window, size, projector, inputs, tone)?;
