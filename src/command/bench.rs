@@ -134,7 +134,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let buffers = Arc::new(SceneBuffers::from_accel(&device, &scene, window, &accel)?);
 
     let plan = RayPlan {
-        sampler: arguments.sampler.basic().unwrap_or(basic::MIS),
+        sampler: arguments.sampler.room().basic().unwrap_or(basic::MIS),
         shadow_rays: arguments.shadow_rays,
         paths: padded_pixels(film),
         repetitions: arguments.repetitions as usize,

@@ -80,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut settings = Settings {
         sampler: arguments.sampler,
         parameters,
-        shadow_rays: arguments.shadow_rays.unwrap_or(arguments.sampler.shadow_rays()),
+        shadow_rays: arguments.shadow_rays.unwrap_or(arguments.sampler.room().shadow_rays()),
         seed: arguments.seed,
         ..Settings::default()
     };

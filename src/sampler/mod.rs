@@ -128,7 +128,8 @@ macro_rules! samplers {
                 }
             }
 
-            fn room(self) -> &'static dyn Room {
+            /// The code of the sampler.
+            pub fn room(self) -> &'static dyn Room {
                 match self {
                     $(Self::$basic => &basic::$tag,)*
                     $(Self::$sampler => &$room::$entry,)*
@@ -184,16 +185,6 @@ impl Sampler {
         })
     }
 
-    /// True if the sampler learns a guide from the whole picture, which outlives its render in a file.
-    pub fn has_guide(self) -> bool {
-        self.room().has_guide()
-    }
-
-    /// Returns the simple form of the sampler if it is one of [`basic`].
-    pub fn basic(self) -> Option<basic::Basic> {
-        self.room().basic()
-    }
-
     /// Returns the parameters relevant to the sampler by key, for metadata and statistics.
     pub fn describe(self, parameters: &Parameters) -> BTreeMap<String, String> {
         let mut named = self.room().describe(parameters);
@@ -208,25 +199,10 @@ impl Sampler {
         parameters.share_paths.unwrap_or(self.room().auto_cohort_edge())
     }
 
-    /// Shadow rays at every vertex that the camera sees, where nobody says otherwise.
-    pub fn shadow_rays(self) -> u32 {
-        self.room().shadow_rays()
-    }
-
     /// True if no sampler or this one has the film layer for itself.
     pub fn has_layer(self, layer: Aov) -> bool {
         let owns = |sampler: &Self| sampler.room().aovs().contains(&layer);
         owns(&self) || !Self::ALL.iter().any(owns)
-    }
-
-    /// Memory per path in flight.
-    pub fn demand(self, parameters: &Parameters, shadow_rays: u32) -> PathDemand {
-        self.room().demand(parameters, shadow_rays)
-    }
-
-    /// Creates the technique of one render. Fails if the device does or its limits are exceeded.
-    pub fn technique(self, context: Context<'_>) -> Result<Box<dyn Technique>> {
-        self.room().create(context)
     }
 }
 

@@ -102,7 +102,7 @@ impl Renderer {
         scene: &Scene,
         at: [u32; 2],
     ) -> Result<Option<Box<dyn Explanation>>> {
-        if self.settings.sampler.has_guide() {
+        if self.settings.sampler.room().has_guide() {
             return self.explain_learned(self.settings.seed, at, LEARNED_RAYS);
         }
         let [x, y] = at;

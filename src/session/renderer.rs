@@ -100,13 +100,13 @@ impl Renderer {
             most_paths: most_paths(device.capabilities()),
         };
         check_memory(device, buffers.window(), passes.aovs, passes.light_groups)?;
-        let demand = settings.sampler.demand(&settings.parameters, settings.shadow_rays);
+        let demand = settings.sampler.room().demand(&settings.parameters, settings.shadow_rays);
         let attempt = |most_paths| -> Result<_> {
             let passes = PassSettings { most_paths, ..passes };
             let mut runner = Runner::new(device, Arc::clone(&buffers), passes, demand)?;
             runner.keep(window);
             let context = Context { scene, parameters: &settings.parameters, runner: &runner };
-            let technique = settings.sampler.technique(context)?;
+            let technique = settings.sampler.room().create(context)?;
             runner.warm_up(technique.as_ref())?;
             // Room for what comes back from a device with memory of its own.
             runner.take_counters()?;

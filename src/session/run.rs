@@ -382,7 +382,7 @@ impl Session {
         let (checkpoint, guide) = Checkpoint::read_with_guide(path)?;
         checkpoint.check_resume(path, &self.metadata(), &self.renderer.sums()?)?;
         self.renderer.restore(&checkpoint.sums)?;
-        if self.renderer.settings().sampler.has_guide() {
+        if self.renderer.settings().sampler.room().has_guide() {
             let (path, bytes) =
                 guide.ok_or_else(|| Error::format(path, "the checkpoint has no guide"))?;
             self.renderer.take_guide(Saved { path: &path, bytes: &bytes, continues: true })?;

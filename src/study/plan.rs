@@ -225,7 +225,7 @@ pub struct Plan {
 impl Plan {
     /// Directions that a contender traces at every vertex.
     pub(crate) fn shadow_rays_of(&self, contender: &Contender) -> u32 {
-        self.shadow_rays.unwrap_or(contender.sampler.shadow_rays())
+        self.shadow_rays.unwrap_or(contender.sampler.room().shadow_rays())
     }
 
     /// Files and folders of the given references.

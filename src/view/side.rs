@@ -47,7 +47,7 @@ impl Side {
         };
         let mut session = Session::of(renderer, device, scene);
         session.pace = PICTURE_TIME;
-        if let Some(bytes) = guide.filter(|_| sampler.has_guide()) {
+        if let Some(bytes) = guide.filter(|_| sampler.room().has_guide()) {
             let path = "guide".as_ref();
             session.renderer.take_guide(Saved { path, bytes, continues: false })?;
         }

@@ -395,7 +395,7 @@ impl Arguments {
         }
         for (name, path) in [("--save-guide", &self.save_guide), ("--load-guide", &self.load_guide)]
         {
-            if let Some(path) = path.as_ref().filter(|_| !self.sampler.has_guide()) {
+            if let Some(path) = path.as_ref().filter(|_| !self.sampler.room().has_guide()) {
                 return Err(Error::usage(format!(
                     "{name} {}: the sampler {} learns nothing; expected --sampler guided",
                     path.display(),
@@ -437,7 +437,7 @@ impl Arguments {
         Ok(Settings {
             sampler: self.sampler,
             parameters,
-            shadow_rays: self.shadow_rays.unwrap_or(self.sampler.shadow_rays()),
+            shadow_rays: self.shadow_rays.unwrap_or(self.sampler.room().shadow_rays()),
             depth: self.depth.unwrap_or(DEFAULT_DEPTH),
             seed: self.seed,
             first_sample: self.sample_offset,
