@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{
     Context, Parameters, Room,
-    rays::{RaySteps, RayTechnique},
+    rays::{RaySteps, Unlearned},
 };
 use crate::{
     error::Result,
@@ -85,6 +85,6 @@ impl Room for Basic {
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let surfaces = context.runner.settings().surfaces;
         let steps = self.steps(context.parameters, surfaces)?;
-        Ok(Box::new(RayTechnique { steps, set: None }))
+        Ok(Box::new(Unlearned { steps, set: None, host_ms: BTreeMap::new() }))
     }
 }

@@ -1,9 +1,11 @@
 //! Samplers that choose each shadow ray by itself, in one pass: those of the kind of `mis`. Such a room
 //! supplies the pass, which draws a light direction and knows its density, and its constants.
 
+use std::collections::BTreeMap;
+
 use crate::{
     gpu::DescriptorSet,
-    pass::{Domain, Kernel, Passes, Roulette, Steps, Surfaces, Technique},
+    pass::{Domain, Kernel, Passes, Report, Roulette, Steps, Surfaces, Technique},
     shader::structs::Wave,
 };
 
@@ -77,14 +79,16 @@ impl Steps for RaySteps {
 }
 
 /// A technique that learns nothing: steps, and tables that stay as they are.
-pub struct RayTechnique {
+pub struct Unlearned<S> {
     /// The steps.
-    pub steps: RaySteps,
+    pub steps: S,
     /// Descriptor set 1.
     pub set: Option<DescriptorSet>,
+    /// Milliseconds of the host by stage.
+    pub host_ms: BTreeMap<String, f64>,
 }
 
-impl Passes for RayTechnique {
+impl<S: Steps> Passes for Unlearned<S> {
     fn steps(&self) -> &dyn Steps {
         &self.steps
     }
@@ -94,4 +98,8 @@ impl Passes for RayTechnique {
     }
 }
 
-impl Technique for RayTechnique {}
+impl<S: Steps + 'static> Technique for Unlearned<S> {
+    fn report(&self) -> Report {
+        Report { host_ms: self.host_ms.clone(), ..Report::default() }
+    }
+}

@@ -53,9 +53,8 @@ impl NodeSize {
 
 /// Descriptor set 1 of `haar`.
 pub struct NodeBuffers {
-    set: DescriptorSet,
-    /// Tree, centres, nodes, sums, caches.
-    buffers: [Buffer; 5],
+    pub(super) set: DescriptorSet,
+    nodes: Buffer,
 }
 
 impl NodeBuffers {
@@ -66,25 +65,22 @@ impl NodeBuffers {
         let centres: Vec<[f32; 4]> = (0..1 << (2 * size.level))
             .map(|node| node_centre(size.level, node).extend(0.0).to_array())
             .collect();
-        let buffers = [
-            Buffer::texels_from_slice(device, "environment tree", tree.nodes())?,
-            Buffer::texels_from_slice(device, "node centres", &centres)?,
-            Buffer::new(device, "product nodes", paths * size.quads() * 8)?,
-            Buffer::new(device, "node sums", paths * size.sums() * 16)?,
-            Buffer::new(device, "blocked directions", paths * size.cache_words() * 4)?,
-        ];
-        let [tree, centres, nodes, sums, cache] = &buffers;
+        let tree = Buffer::texels_from_slice(device, "environment tree", tree.nodes())?;
+        let centres = Buffer::texels_from_slice(device, "node centres", &centres)?;
+        let nodes = Buffer::new(device, "product nodes", paths * size.quads() * 8)?;
+        let sums = Buffer::new(device, "node sums", paths * size.sums() * 16)?;
+        let cache = Buffer::new(device, "blocked directions", paths * size.cache_words() * 4)?;
         let bound = [
-            (haar::HAAR_TREE, tree),
-            (haar::HAAR_CENTRES, centres),
-            (haar::HAAR_NODES, nodes),
-            (haar::HAAR_NODE_TEXELS, nodes),
-            (haar::HAAR_SUMS, sums),
-            (haar::HAAR_SUM_TEXELS, sums),
-            (haar::HAAR_CACHE, cache),
+            (haar::HAAR_TREE, &tree),
+            (haar::HAAR_CENTRES, &centres),
+            (haar::HAAR_NODES, &nodes),
+            (haar::HAAR_NODE_TEXELS, &nodes),
+            (haar::HAAR_SUMS, &sums),
+            (haar::HAAR_SUM_TEXELS, &sums),
+            (haar::HAAR_CACHE, &cache),
         ];
         let set = DescriptorSet::new(device, &haar::TABLE, &bound)?;
-        Ok(Self { set, buffers })
+        Ok(Self { set, nodes })
     }
 
     /// Descriptor set 1.
@@ -94,6 +90,6 @@ impl NodeBuffers {
 
     /// Halves of the nodes, two words for each four.
     pub fn nodes(&self) -> &Buffer {
-        &self.buffers[2]
+        &self.nodes
     }
 }

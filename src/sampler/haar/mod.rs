@@ -17,11 +17,10 @@ pub use parameters::HaarParameters;
 pub use steps::HaarSteps;
 use tree::Tree;
 
-use super::{Context, Parameters, Room, knob::Knobs};
+use super::{Context, Parameters, Room, knob::Knobs, rays::Unlearned};
 use crate::{
     error::Result,
-    gpu::DescriptorSet,
-    pass::{Passes, PathDemand, Report, Steps, Technique},
+    pass::{PathDemand, Technique},
 };
 
 pub(super) struct HaarRoom;
@@ -55,31 +54,7 @@ impl Room for HaarRoom {
         let steps = HaarSteps::new(parameters, tree.depth(), surfaces, shadow_rays);
         let size = NodeSize::new(parameters, shadow_rays);
         let nodes = NodeBuffers::new(runner.device(), &tree, size, runner.waves().capacity())?;
-        Ok(Box::new(HaarTechnique { steps, nodes, tree_ms }))
-    }
-}
-
-struct HaarTechnique {
-    steps: HaarSteps,
-    nodes: NodeBuffers,
-    tree_ms: f64,
-}
-
-impl Passes for HaarTechnique {
-    fn steps(&self) -> &dyn Steps {
-        &self.steps
-    }
-
-    fn set(&self) -> Option<&DescriptorSet> {
-        Some(self.nodes.set())
-    }
-}
-
-impl Technique for HaarTechnique {
-    fn report(&self) -> Report {
-        Report {
-            host_ms: BTreeMap::from([("environment tree".to_owned(), self.tree_ms)]),
-            ..Report::default()
-        }
+        let host_ms = [("environment tree".to_owned(), tree_ms)].into();
+        Ok(Box::new(Unlearned { steps, set: Some(nodes.set), host_ms }))
     }
 }

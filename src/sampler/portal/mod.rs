@@ -13,7 +13,7 @@ pub use parameters::PortalParameters;
 use super::{
     Context, Parameters, Room,
     knob::Knobs,
-    rays::{RaySteps, RayTechnique},
+    rays::{RaySteps, Unlearned},
 };
 use crate::{
     error::Result,
@@ -44,7 +44,7 @@ impl Room for PortalRoom {
         let count = scene.portals.len() as u32;
         let steps = steps(parameters, count, runner.settings().surfaces);
         let set = Some(upload(runner.device(), &scene.portals)?);
-        Ok(Box::new(RayTechnique { steps, set }))
+        Ok(Box::new(Unlearned { steps, set, host_ms: BTreeMap::new() }))
     }
 }
 
