@@ -35,13 +35,15 @@ vec3 to_world(Frame frame, vec3 direction_local) {
         + frame.normal * direction_local.z;
 }
 
+// Folds the lower half of the octahedron over the upper, and back.
+vec2 octahedron_fold(vec2 p) {
+    return (1.0 - abs(p.yx)) * vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);
+}
+
 // Packs a unit vector by the octahedral map, 16 bits a coordinate; twin of octahedron::pack.
 uint pack_normal(vec3 normal) {
     vec2 p = normal.xy / (abs(normal.x) + abs(normal.y) + abs(normal.z));
-    if (normal.z < 0.0) {
-        vec2 sign_of = vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);
-        p = (1.0 - abs(p.yx)) * sign_of;
-    }
+    p = normal.z < 0.0 ? octahedron_fold(p) : p;
     ivec2 quantised = ivec2(round(clamp(p, -1.0, 1.0) * 32767.0));
     return (uint(quantised.x) & 0xffffu) | (uint(quantised.y) << 16u);
 }
@@ -51,10 +53,7 @@ vec3 unpack_normal(uint packed_normal) {
     ivec2 quantised = ivec2(int(packed_normal << 16) >> 16, int(packed_normal) >> 16);
     vec2 p = vec2(quantised) / 32767.0;
     float z = 1.0 - abs(p.x) - abs(p.y);
-    if (z < 0.0) {
-        vec2 sign_of = vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);
-        p = (1.0 - abs(p.yx)) * sign_of;
-    }
+    p = z < 0.0 ? octahedron_fold(p) : p;
     return normalize(vec3(p, z));
 }
 

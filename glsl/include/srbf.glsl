@@ -2,7 +2,7 @@
 // Densities and integrals cover the whole sphere, in solid angle. The forms hold in 32-bit floats
 // for bandwidths from 1e-3 to 1e5; the twins give the reason for each.
 
-const float SRBF_PI = 3.14159265358979;
+#include "frame.glsl"
 
 // exp(x) - 1 with a small relative error: Taylor series below 1/2.
 float expm1(float x) {
@@ -46,9 +46,9 @@ float kernel_value(vec3 axis, float bandwidth, vec3 direction) {
 // Integral of the kernel over the sphere.
 float kernel_integral(float bandwidth) {
     if (bandwidth < 1e-3) {
-        return 4.0 * SRBF_PI * (1.0 - bandwidth);
+        return 4.0 * PI * (1.0 - bandwidth);
     }
-    return -2.0 * SRBF_PI * expm1(-2.0 * bandwidth) / bandwidth;
+    return -2.0 * PI * expm1(-2.0 * bandwidth) / bandwidth;
 }
 
 // Steepness of the error function that gives a kernel's share above a plane. [Tokuyoshi 2022].
@@ -62,15 +62,6 @@ float kernel_part_of_ratio(float bandwidth, float ratio) {
     float blend = clamp(0.5 + 0.5 * ratio, 0.0, 1.0);
     float e = exp(-bandwidth);
     return (e + (1.0 - e) * blend) / (1.0 + e);
-}
-
-// Two unit vectors that complete the axis to a right-handed frame. [Duff et al. 2017].
-void lobe_frame(vec3 axis, out vec3 tangent, out vec3 bitangent) {
-    float s = axis.z < 0.0 ? -1.0 : 1.0;
-    float a = -1.0 / (s + axis.z);
-    float b = axis.x * axis.y * a;
-    tangent = vec3(1.0 + s * axis.x * axis.x * a, s * b, -s * axis.x);
-    bitangent = vec3(b, s + axis.y * axis.y * a, -axis.y);
 }
 
 // Maps a uniform number u in 0...1 to a distance x = 1 - dot(direction, axis) in 0...2.
@@ -90,11 +81,10 @@ float kernel_sample_distance(float bandwidth, float u) {
 vec3 kernel_sample(vec3 axis, float bandwidth, vec2 u) {
     float x = kernel_sample_distance(bandwidth, u.x);
     float sine = sqrt(x * (2.0 - x));
-    float azimuth = 2.0 * SRBF_PI * u.y;
-    vec3 tangent;
-    vec3 bitangent;
-    lobe_frame(axis, tangent, bitangent);
-    return (1.0 - x) * axis + sine * cos(azimuth) * tangent + sine * sin(azimuth) * bitangent;
+    float azimuth = 2.0 * PI * u.y;
+    Frame frame = frame_from_normal(axis);
+    return (1.0 - x) * axis + sine * cos(azimuth) * frame.tangent
+        + sine * sin(azimuth) * frame.bitangent;
 }
 
 // Density of kernel_sample per steradian.

@@ -55,10 +55,8 @@ vec3 draw_from_lobe(Vertex vertex, uint ray, ProductLobe lobe, vec2 u) {
     }
     float x = walk(vertex, ray, lobe.bandwidth);
     vec2 azimuth = sin_cos_pi(2.0 * u.y) * sqrt(x * (2.0 - x));
-    vec3 tangent;
-    vec3 bitangent;
-    lobe_frame(lobe.axis, tangent, bitangent);
-    return (1.0 - x) * lobe.axis + azimuth.y * tangent + azimuth.x * bitangent;
+    Frame frame = frame_from_normal(lobe.axis);
+    return (1.0 - x) * lobe.axis + azimuth.y * frame.tangent + azimuth.x * frame.bitangent;
 }
 
 // Samples the world direction of one ray. Directions below the horizon contribute nothing.
@@ -111,7 +109,7 @@ float mixture_lobe_density(Mixture mixture, vec3 direction) {
             masks_under_way[word] = mask;
         }
     }
-    return mixture.total > 0.0 ? density / (2.0 * SRBF_PI * mixture.total) : 0.0;
+    return mixture.total > 0.0 ? density / (2.0 * PI * mixture.total) : 0.0;
 }
 
 // Returns the density of the whole mixture where that of the lobes is `lobe_density`.
