@@ -10,25 +10,18 @@ const ARMIJO: f64 = 1e-4;
 /// Halvings of a step before the search gives up.
 const MAX_HALVINGS: usize = 30;
 
-/// Limits of the unknowns.
-#[derive(Clone, Debug)]
-pub(crate) struct Bounds {
-    /// Lower and upper limit per unknown.
-    pub limits: Vec<(f64, f64)>,
+/// Lower and upper limit of an unknown.
+pub(crate) type Bounds = (f64, f64);
+
+fn project(bounds: &[Bounds], unknowns: &mut [f64]) {
+    for (value, (lower, upper)) in unknowns.iter_mut().zip(bounds) {
+        *value = value.clamp(*lower, *upper);
+    }
 }
 
-impl Bounds {
-    fn project(&self, unknowns: &mut [f64]) {
-        for (value, (lower, upper)) in unknowns.iter_mut().zip(&self.limits) {
-            *value = value.clamp(*lower, *upper);
-        }
-    }
-
-    /// True if a bound holds the unknown against the descent.
-    fn holds(&self, index: usize, value: f64, gradient: f64) -> bool {
-        let (lower, upper) = self.limits[index];
-        (value <= lower && gradient > 0.0) || (value >= upper && gradient < 0.0)
-    }
+/// True if a bound holds the unknown against the descent.
+fn holds((lower, upper): Bounds, value: f64, gradient: f64) -> bool {
+    (value <= lower && gradient > 0.0) || (value >= upper && gradient < 0.0)
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -40,19 +33,19 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// `steps`. Calls `progress` with the number of each finished step.
 pub(crate) fn minimize(
     function: impl Fn(&[f64]) -> (f64, Vec<f64>),
-    bounds: &Bounds,
+    bounds: &[Bounds],
     unknowns: &mut Vec<f64>,
     steps: usize,
     tolerance: f64,
     progress: &mut dyn FnMut(usize),
 ) {
-    bounds.project(unknowns);
+    project(bounds, unknowns);
     let (mut value, mut gradient) = function(unknowns);
     let mut memory: VecDeque<(Vec<f64>, Vec<f64>)> = VecDeque::new();
     let mut history = vec![value];
     for step in 0..steps {
         let held: Vec<bool> = (0..unknowns.len())
-            .map(|index| bounds.holds(index, unknowns[index], gradient[index]))
+            .map(|index| holds(bounds[index], unknowns[index], gradient[index]))
             .collect();
         let mask = |vector: &mut [f64]| {
             for (value, _) in vector.iter_mut().zip(&held).filter(|(_, held)| **held) {
@@ -94,7 +87,7 @@ pub(crate) fn minimize(
         for _ in 0..MAX_HALVINGS {
             let mut trial: Vec<f64> =
                 unknowns.iter().zip(&direction).map(|(x, d)| x - length * d).collect();
-            bounds.project(&mut trial);
+            project(bounds, &mut trial);
             let decrease: f64 =
                 unknowns.iter().zip(&trial).zip(&gradient).map(|((x, t), g)| (x - t) * g).sum();
             let (trial_value, trial_gradient) = function(&trial);
@@ -142,11 +135,11 @@ mod tests {
             let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
             (a * a + 100.0 * b * b, vec![-2.0 * a - 400.0 * b * x[0], 200.0 * b])
         };
-        let free = Bounds { limits: vec![(-5.0, 5.0); 2] };
+        let free = [(-5.0, 5.0); 2];
         let mut x = vec![-1.2, 1.0];
         minimize(function, &free, &mut x, 500, 1e-15, &mut |_| ());
         assert!((x[0] - 1.0).abs() < 1e-4 && (x[1] - 1.0).abs() < 1e-4, "{x:?}");
-        let tight = Bounds { limits: vec![(-5.0, 0.5), (-5.0, 5.0)] };
+        let tight = [(-5.0, 0.5), (-5.0, 5.0)];
         let mut x = vec![-1.2, 1.0];
         minimize(function, &tight, &mut x, 500, 1e-15, &mut |_| ());
         assert!((x[0] - 0.5).abs() < 1e-6 && (x[1] - 0.25).abs() < 1e-4, "{x:?}");

@@ -62,11 +62,11 @@ impl SquaredError {
         (Self { patches, square, scales }, unknowns)
     }
 
-    pub(crate) fn bounds(&self) -> Bounds {
+    pub(crate) fn bounds(&self) -> Vec<Bounds> {
         let free = (f64::NEG_INFINITY, f64::INFINITY);
         let one =
             [free, free, free, (MIN_BANDWIDTH.ln(), MAX_BANDWIDTH.ln()), (0.0, f64::INFINITY)];
-        Bounds { limits: one.into_iter().cycle().take(UNKNOWNS * self.scales.len()).collect() }
+        one.repeat(self.scales.len())
     }
 
     fn lobes(&self, unknowns: &[f64]) -> Vec<Scaled> {
