@@ -55,7 +55,7 @@ impl<'a> Recording<'a> {
             let next = Commands::begin_timed(self.device, self.most_passes)?;
             let mut before = std::mem::replace(&mut self.commands, next);
             before.make_visible_to_host();
-            add_times(&mut self.times, before.submit_and_wait()?);
+            add_times(&mut self.times, &before.submit_and_wait()?);
             let start = Instant::now();
             // Cohorts need the first two vertices of all paths.
             let may_end = self.ends && question == Question::Closest && wave.vertex > 1;
@@ -81,13 +81,14 @@ impl<'a> Recording<'a> {
     /// As [`Commands::submit_and_wait`].
     pub fn finish(self) -> Result<PassTimes> {
         let mut times = self.times;
-        add_times(&mut times, self.commands.submit_and_wait()?);
+        add_times(&mut times, &self.commands.submit_and_wait()?);
         Ok(times)
     }
 }
 
-fn add_times(times: &mut PassTimes, more: PassTimes) {
+/// Adds times by pass.
+pub(super) fn add_times(times: &mut PassTimes, more: &PassTimes) {
     for (pass, ms) in more {
-        *times.entry(pass).or_default() += ms;
+        *times.entry(pass.clone()).or_default() += ms;
     }
 }

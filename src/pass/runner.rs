@@ -15,7 +15,7 @@ use super::{
     film_buffers::{BLOCK_PIXELS, FilmBuffers, padded_pixels},
     kernel::{Dispatch, Domain, Kernel, Pass},
     order::{FEATURES, PassSettings, PathLists, wave_order},
-    recording::Recording,
+    recording::{Recording, add_times},
     scene_buffers::SceneBuffers,
     sharing_buffers::SharingBuffers,
     steps::{Passes, PathDemand, SHADOW_RAYS_PER_GROUP, Steps},
@@ -308,7 +308,7 @@ impl Runner {
             self.record_accumulation(&mut recording, technique, wave)?;
         }
         let times = recording.finish()?;
-        self.totals.add_times(&times);
+        add_times(&mut self.totals.gpu_ms, &times);
         Ok(times)
     }
 

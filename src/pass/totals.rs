@@ -39,13 +39,6 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Adds device times by pass.
-    pub(crate) fn add_times(&mut self, times: &PassTimes) {
-        for (pass, ms) in times {
-            *self.gpu_ms.entry(pass.clone()).or_default() += ms;
-        }
-    }
-
     /// Adds the counts of the device.
     pub(crate) fn add(&mut self, counters: &Counters) {
         self.camera_rays += u64::from(counters.camera_rays);
