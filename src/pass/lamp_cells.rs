@@ -5,7 +5,7 @@
 //! Departs from a light tree \[Conty Estevez & Kulla 2018\] by knowing what is blocked: lamps behind a wall
 //! are as near as those before it.
 
-use std::{collections::BTreeMap, f32::consts::PI};
+use std::{collections::BTreeMap, f32::consts::PI, ops::Range};
 
 use glam::{UVec3, Vec3};
 use rayon::prelude::*;
@@ -29,7 +29,7 @@ use crate::{
         constants::{
             LAMP_BIT, LAMP_DIRECTIONAL, LAMP_POINT, LAMP_SPOT_LINEAR_ANGLE, LAMP_SPOT_SMOOTH_COSINE,
         },
-        structs::{Lamp, LampEntry},
+        structs::{Lamp, LampChoice, LampEntry},
     },
     stage,
 };
@@ -176,14 +176,12 @@ fn cube_face(normal: Vec3) -> usize {
 impl LampCells {
     /// Makes the lists of a scene for the clusters of `tables`, of which there are some.
     pub(super) fn new(scene: &Scene, accel: &Accel, tables: &LampTables) -> Self {
-        let (clusters, total) = (&tables.clusters[..], tables.total);
+        let clusters = &tables.clusters;
         stage::enter(format_args!("looking for {} groups of lamps", clusters.len()));
         let rays = MOST_TRIED.min(clusters.len()) * PLACES;
         let survey = Survey {
             accel,
             tables,
-            clusters,
-            total,
             passes: scene.materials.iter().map(surfaces::passes).collect(),
             two_sided: scene
                 .materials
@@ -220,7 +218,7 @@ impl LampCells {
             .into_par_iter()
             .map(|(label, (places, edge))| survey.list(label, places, *edge, list_length))
             .collect();
-        let by_power = list_of(tables.source_count, &[], 1.0, total, list_length);
+        let by_power = list_of(tables, &[], 1.0, list_length);
         let entries = by_power.into_iter().chain(lists.into_iter().flatten()).collect();
         let first_of = |number: usize| ((number + 1) * list_length) as u32;
         let [width, height, depth] = grid.size;
@@ -250,9 +248,6 @@ impl LampCells {
 struct Survey<'a> {
     accel: &'a Accel,
     tables: &'a LampTables,
-    clusters: &'a [Cluster],
-    /// Power of all lamps.
-    total: f64,
     /// True for materials that light may pass.
     passes: Vec<bool>,
     /// True for materials that emit to both sides.
@@ -267,7 +262,6 @@ impl Survey<'_> {
     fn walk(&self, walk: u32) -> Vec<Place> {
         let mut places = Vec::new();
         let [a, b, c, d] = hash_4d([walk, 0, 0, SEED]);
-        let scaled = |bits: u32, count: usize| ((u64::from(bits) * count as u64) >> 32) as u32;
         let sides = [1.0, -1.0][(d & 1) as usize];
         let triangles = self.accel.placed_count();
         let choice = self.choice(0..self.tables.source_count, a, b);
@@ -325,15 +319,8 @@ impl Survey<'_> {
     }
 
     /// Draws a lamp from an alias table.
-    fn choice(
-        &self,
-        columns: std::ops::Range<u32>,
-        a: u32,
-        b: u32,
-    ) -> crate::shader::structs::LampChoice {
-        let count = u64::from(columns.end - columns.start);
-        let own =
-            self.tables.choices[(columns.start + ((u64::from(a) * count) >> 32) as u32) as usize];
+    fn choice(&self, columns: Range<u32>, a: u32, b: u32) -> LampChoice {
+        let own = self.tables.choices[(columns.start + scaled(a, columns.len())) as usize];
         if b < own.threshold {
             own
         } else {
@@ -402,7 +389,7 @@ impl Survey<'_> {
     fn power_of(&self, source: u32, cluster: &Cluster) -> f32 {
         let own = cluster.columns.clone().map(|column| &self.tables.choices[column as usize]);
         let own = own.filter(|choice| choice.source == source).map(|choice| choice.probability);
-        own.sum::<f32>() * self.total as f32
+        own.sum::<f32>() * self.tables.total as f32
     }
 
     /// Makes the list of a cell with these places.
@@ -415,6 +402,7 @@ impl Survey<'_> {
             cluster.power / f64::from(squared.max(least))
         };
         let mut estimates: Vec<Estimate<'_>> = self
+            .tables
             .clusters
             .iter()
             .map(|cluster| Estimate {
@@ -443,11 +431,11 @@ impl Survey<'_> {
         estimates.retain(|estimate| estimate.weight > 1e-4 * all);
         let listed = sum(|e| e.weight, &estimates);
         if listed <= 0.0 {
-            return list_of(self.tables.source_count, &[], 1.0, self.total, length);
+            return list_of(self.tables, &[], 1.0, length);
         }
         let by_power = (1.0 - listed / all).clamp(BY_POWER[0], BY_POWER[1]);
         estimates.sort_by_key(columns);
-        list_of(self.tables.source_count, &estimates, by_power, self.total, length)
+        list_of(self.tables, &estimates, by_power, length)
     }
 
     /// Estimates what a cluster brings to places.
@@ -494,6 +482,11 @@ fn spot_falloff(lamp: &Lamp, cosine: f32) -> f32 {
     if lamp.kind == LAMP_SPOT_SMOOTH_COSINE { t * t * (3.0 - 2.0 * t) } else { t * t }
 }
 
+/// Twin of `scaled` in `glsl/include/random.glsl`.
+fn scaled(bits: u32, count: usize) -> u32 {
+    ((u64::from(bits) * count as u64) >> 32) as u32
+}
+
 /// Returns a direction in proportion to the cosine.
 fn bounced(normal: Vec3, [a, b, ..]: [u32; 4]) -> Vec3 {
     let out = direction_from_square([unit_float(a), unit_float(b)].into());
@@ -503,10 +496,9 @@ fn bounced(normal: Vec3, [a, b, ..]: [u32; 4]) -> Vec3 {
 /// Returns a list of `length` entries: one for all lamps, drawn by power with the probability `by_power`, and
 /// one for each estimate, in the order of columns.
 fn list_of(
-    source_count: u32,
+    tables: &LampTables,
     estimates: &[Estimate<'_>],
     by_power: f64,
-    total: f64,
     length: usize,
 ) -> Vec<LampEntry> {
     let sum: f64 = estimates.iter().map(|estimate| estimate.weight).sum();
@@ -518,7 +510,7 @@ fn list_of(
         before: 0,
         ratio: by_power as f32,
         first: 0,
-        count: source_count,
+        count: tables.source_count,
         visibility: LEAST_VISIBILITY.powf(VISIBILITY_EXPONENT),
     });
     let (mut before, mut weight) = (end, 0.0);
@@ -531,7 +523,7 @@ fn list_of(
         let columns = &estimate.cluster.columns;
         entries.push(LampEntry {
             before: before as u32,
-            ratio: (own * total / estimate.cluster.power + by_power) as f32,
+            ratio: (own * tables.total / estimate.cluster.power + by_power) as f32,
             first: columns.start,
             count: columns.end - columns.start,
             visibility: estimate.visibility,
