@@ -50,7 +50,7 @@ impl Accel {
         direction: Vec3,
         farthest: f32,
     ) -> Option<Intersection> {
-        let mut ray = self.start(origin, direction, false);
+        let mut ray = Traversal::start(self, origin, direction, false);
         ray.distance = farthest;
         while ray.step() {}
         ray.hit()
@@ -62,20 +62,16 @@ impl Accel {
         origin: Vec3,
         direction: Vec3,
     ) -> (Option<Intersection>, Work) {
-        let mut ray = self.start(origin, direction, false);
+        let mut ray = Traversal::start(self, origin, direction, false);
         while ray.step() {}
         (ray.hit(), ray.work)
     }
 
     /// True if the ray meets any triangle; `direction` is a unit vector.
     pub fn is_occluded(&self, origin: Vec3, direction: Vec3) -> bool {
-        let mut ray = self.start(origin, direction, true);
+        let mut ray = Traversal::start(self, origin, direction, true);
         while ray.step() {}
         ray.hit().is_some()
-    }
-
-    fn start(&self, origin: Vec3, direction: Vec3, any_hit: bool) -> Traversal<'_> {
-        Traversal::start(self, origin, direction, any_hit)
     }
 
     /// Offset of ray origins from their surface, metres.
