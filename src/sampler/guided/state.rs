@@ -214,25 +214,21 @@ impl GuideState {
         if header.arm.is_some_and(|arm| !arm.is_possible()) {
             return Err(damaged("its header holds an impossible arm"));
         }
-        let counts = header.cells.checked_mul(header.origin.regions as usize);
-        let length = counts.and_then(|counts| {
-            let counts = counts.checked_add(header.pending)?.checked_mul(COUNT_WORDS)?;
-            let fives = (header.origin.regions as usize).checked_mul(5)?;
-            let shares = header.cells.checked_mul(SHARE_WORDS)?;
-            let arrivals = header.arrivals.checked_add(header.pending_arrivals)?.checked_mul(2)?;
-            counts
-                .checked_add(fives)?
-                .checked_add(shares)?
-                .checked_add(header.pending_shares)?
-                .checked_add(header.cells)?
-                .checked_add(header.refined)?
-                .checked_add(header.missing)?
-                .checked_add(arrivals)
-        });
-        let (Some(counts), Some(length)) = (counts, length) else {
-            return Err(damaged("its header holds impossible lengths"));
-        };
-        let shares = header.cells * SHARE_WORDS;
+        let regions = header.origin.regions as usize;
+        // Sums of so wide numbers do not overflow.
+        let words_of = |count: usize, words: usize| count as u128 * words as u128;
+        let length = words_of(header.cells, regions) * COUNT_WORDS as u128
+            + words_of(header.cells, SHARE_WORDS + 1)
+            + words_of(header.pending, COUNT_WORDS)
+            + words_of(regions, 5)
+            + words_of(header.arrivals, 2)
+            + words_of(header.pending_arrivals, 2)
+            + words_of(header.pending_shares, 1)
+            + words_of(header.refined, 1)
+            + words_of(header.missing, 1);
+        let length =
+            usize::try_from(length).map_err(|_| damaged("its header holds impossible lengths"))?;
+        let (counts, shares) = (header.cells * regions, header.cells * SHARE_WORDS);
         memory::check(path.display(), (length as u64).saturating_mul(4)).map_err(Error::memory)?;
         let words = unpack(words, length)
             .filter(|_| header.pending <= counts && header.pending_shares <= shares)
@@ -248,7 +244,6 @@ impl GuideState {
         let pairs = |words: Vec<u32>| -> Vec<ArrivalWords> {
             words.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
         };
-        let regions = header.origin.regions as usize;
         let state = Self {
             origin: header.origin,
             samples: header.samples,
