@@ -196,7 +196,7 @@ impl Runner {
             done += wave.pixel_count;
             // The last wave of a picture's sweep ends with its samples in the sums.
             let ends_sweep = done == pixels && wave.is_training == 0;
-            let times = self.run_to(technique, wave, self.settings.depth, ends_sweep)?;
+            let times = self.run(technique, wave, self.settings.depth, ends_sweep)?;
             self.steer(&times, wave);
             if self.watch.as_mut().is_some_and(|watch| watch(&wave)) {
                 self.is_stopped = true;
@@ -251,18 +251,9 @@ impl Runner {
     }
 
     /// Runs one wave for `vertices` vertices; returns device ms by pass. All pixels lie in one page of
-    /// the film, unless the wave is for training. Fails if the device does.
+    /// the film, unless the wave is for training. After the last wave of a sweep, `accumulates` its
+    /// samples. Fails if the device does.
     pub(crate) fn run(
-        &mut self,
-        technique: &dyn Passes,
-        wave: Wave,
-        vertices: u32,
-    ) -> Result<PassTimes> {
-        self.run_to(technique, wave, vertices, false)
-    }
-
-    /// As [`Runner::run`]; after the last wave of a sweep, `accumulates` its samples.
-    fn run_to(
         &mut self,
         technique: &dyn Passes,
         wave: Wave,

@@ -167,7 +167,7 @@ impl Race<'_> {
             let mut block = spread.block_count();
             for wave in self.waves(runner, progress, blocks, round) {
                 let depth = runner.settings().depth;
-                let times = runner.run(&trials[index], wave, depth)?;
+                let times = runner.run(&trials[index], wave, depth, false)?;
                 let paths = (wave.pixel_count * SAMPLES) as usize;
                 ms[index] +=
                     times.values().sum::<f64>() / f64::from(blocks.count * BLOCK_PIXELS * SAMPLES);

@@ -75,7 +75,7 @@ impl Guided {
         };
         let epoch = progress.first_sample.wrapping_add(self.rebuilt_at);
         let wave = Wave { is_training: 1, ..with_epoch(wave, epoch, self.tag) };
-        runner.run(self, wave, 1)?;
+        runner.run(self, wave, 1, false)?;
         runner.film().take_counters()?;
 
         let waves = runner.waves();
