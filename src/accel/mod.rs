@@ -229,12 +229,7 @@ impl Trees {
             (self.nodes.len() as u32, self.scene_triangles.len() as u32);
         let nodes: Vec<Node> = bytemuck::allocation::cast_vec(nodes);
         self.append(nodes, first_node, first_triangle);
-        let of_mesh = primitive_indices.iter().map(|&index| kept[index as usize]);
-        if self.scene_triangles.is_empty() {
-            self.scene_triangles = of_mesh.collect();
-        } else {
-            self.scene_triangles.extend(of_mesh);
-        }
+        self.scene_triangles.extend(primitive_indices.iter().map(|&index| kept[index as usize]));
         self.first_triangles.push(self.scene_triangles.len() as u32);
         Ok(around)
     }

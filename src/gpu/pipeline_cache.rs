@@ -60,7 +60,6 @@ impl PipelineCache {
 }
 
 fn file(capabilities: &Capabilities) -> Option<PathBuf> {
-    let identity: String =
-        capabilities.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect();
+    let identity = files::hexadecimal(&capabilities.pipeline_cache_uuid);
     Some(files::cache_folder("pipelines")?.join(format!("{identity}.bin")))
 }
