@@ -1,6 +1,6 @@
 //! Data on the device that stays constant during a render.
 
-use std::{collections::BTreeMap, sync::Arc, time::Instant};
+use std::{borrow::Borrow, collections::BTreeMap, sync::Arc, time::Instant};
 
 use glam::Vec3;
 
@@ -51,34 +51,23 @@ impl SceneBuffers {
         let start = Instant::now();
         let accel = Accel::build(&scene.geometry, triangle_page_bytes(device.capabilities()))?;
         let bvh_ms = start.elapsed().as_secs_f64() * 1e3;
-        let start = Instant::now();
-        let parts = Parts::new(device, scene, &accel)?;
-        drop(accel);
-        let mut scene_buffers = Self::with_parts(device, scene, window, parts, start)?;
+        let mut scene_buffers = Self::from_accel(device, scene, window, accel)?;
         scene_buffers.host_ms.insert("bvh".to_owned(), bvh_ms);
         Ok(scene_buffers)
     }
 
-    /// As [`SceneBuffers::new`], with an acceleration structure that the caller keeps.
+    /// As [`SceneBuffers::new`], with an acceleration structure, which is dropped early unless the caller
+    /// keeps it.
     pub(crate) fn from_accel(
         device: &Arc<Device>,
         scene: &Scene,
         window: Window,
-        accel: &Accel,
+        accel: impl Borrow<Accel>,
     ) -> Result<Self> {
         let start = Instant::now();
-        let parts = Parts::new(device, scene, accel)?;
-        Self::with_parts(device, scene, window, parts, start)
-    }
-
-    fn with_parts(
-        device: &Arc<Device>,
-        scene: &Scene,
-        window: Window,
-        parts: Parts,
-        start: Instant,
-    ) -> Result<Self> {
-        let Parts { geometry, textures, lamps, lamp_cells, light_groups, tables, mattes } = parts;
+        let Parts { geometry, textures, lamps, lamp_cells, light_groups, tables, mattes } =
+            Parts::new(device, scene, accel.borrow())?;
+        drop(accel);
         let mut host_ms = BTreeMap::new();
         let material_kinds =
             tables.materials.iter().fold(0, |bits, material| bits | 1 << material.kind);
