@@ -33,8 +33,10 @@ pub struct FitSizes {
 pub struct Fits {
     buffers: [Buffer; 3],
     sizes: FitSizes,
-    hashes: BTreeMap<String, String>,
-    fit_ms: f64,
+    /// Hash of each fit, by the name of its input.
+    pub(super) hashes: BTreeMap<String, String>,
+    /// Milliseconds spent on all fits, or on finding them in the cache.
+    pub(super) fit_ms: f64,
 }
 
 impl Fits {
@@ -136,16 +138,6 @@ impl Fits {
     /// Numbers of lobes and views.
     pub fn sizes(&self) -> FitSizes {
         self.sizes
-    }
-
-    /// Hash of each fit, by the name of its input.
-    pub fn hashes(&self) -> &BTreeMap<String, String> {
-        &self.hashes
-    }
-
-    /// Milliseconds spent on all fits, or on finding them in the cache.
-    pub fn fit_ms(&self) -> f64 {
-        self.fit_ms
     }
 }
 

@@ -42,7 +42,8 @@ pub struct LobeBuffers {
     set: DescriptorSet,
     /// Lobes, their number, sums of weights, close lobes, visibility caches.
     buffers: [Buffer; 5],
-    fits: Fits,
+    /// The fits.
+    pub(super) fits: Fits,
 }
 
 impl LobeBuffers {
@@ -80,11 +81,6 @@ impl LobeBuffers {
     /// Descriptor set 1.
     pub fn set(&self) -> &DescriptorSet {
         &self.set
-    }
-
-    /// The fits.
-    pub fn fits(&self) -> &Fits {
-        &self.fits
     }
 
     /// Two words per lobe and path (`lobes.glsl`).

@@ -89,8 +89,8 @@ impl Technique for Product {
 
 pub(super) fn report(lobes: &LobeBuffers) -> Report {
     Report {
-        host_ms: [("fits".to_owned(), lobes.fits().fit_ms())].into(),
-        fit_hashes: lobes.fits().hashes().clone(),
+        host_ms: [("fits".to_owned(), lobes.fits.fit_ms)].into(),
+        fit_hashes: lobes.fits.hashes.clone(),
         ..Report::default()
     }
 }
