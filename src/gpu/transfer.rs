@@ -22,7 +22,7 @@ const WORDS_TOGETHER: usize = 1 << 14;
 
 impl Buffer {
     /// Creates a buffer that holds `data`, or one element of zeros, and is read only as a uniform texel
-    /// buffer, so the limit on storage buffers does not apply. The descriptor set checks the number of texels.
+    /// buffer: no limit on storage buffers applies. The descriptor set checks the number of texels.
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if memory runs out.
