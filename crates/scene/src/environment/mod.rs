@@ -47,24 +47,6 @@ pub struct EnvironmentMap {
     pub source: String,
 }
 
-/// Radiance at the four texel centres around a cell.
-///
-/// Row `j` of cells lies between texel rows `j - 1` and `j`, so that the first and last rows are
-/// half cells. Column `i` lies between texel columns `i` and `i + 1`, wrapping.
-struct Cell {
-    c00: Vec3,
-    c10: Vec3,
-    c01: Vec3,
-    c11: Vec3,
-}
-
-impl Cell {
-    fn interpolate(&self, position: Vec2) -> Vec3 {
-        let upper = self.c00.lerp(self.c10, position.x);
-        upper.lerp(self.c01.lerp(self.c11, position.x), position.y)
-    }
-}
-
 impl EnvironmentMap {
     /// Radiance in every direction, if it is the same in all.
     pub fn uniform_radiance(&self) -> Option<Vec3> {
@@ -107,23 +89,11 @@ impl EnvironmentMap {
         Vec3::new(c * direction.x - s * direction.z, direction.y, s * direction.x + c * direction.z)
     }
 
-    fn cell(&self, column: u32, row: u32) -> Cell {
-        let next_column = if column + 1 == self.width { 0 } else { column + 1 };
-        let upper = row.saturating_sub(1);
-        let lower = row.min(self.height - 1);
-        let texel = |column: u32, row: u32| {
-            self.texels[row as usize * self.width as usize + column as usize]
-        };
-        Cell {
-            c00: texel(column, upper),
-            c10: texel(next_column, upper),
-            c01: texel(column, lower),
-            c11: texel(next_column, lower),
-        }
-    }
-
     /// Finds the cell that contains a unit direction: its column, its row, and the position inside
     /// it. Twin of `environment_locate`.
+    ///
+    /// Row `j` of cells lies between texel rows `j - 1` and `j`, so that the first and last rows are
+    /// half cells. Column `i` lies between texel columns `i` and `i + 1`, wrapping.
     pub fn locate(&self, direction: Vec3) -> (u32, u32, Vec2) {
         let uv = lat_long_from_direction(self.map_from_world(direction));
         let x = uv.x * self.width as f32 - 0.5;
@@ -137,6 +107,11 @@ impl EnvironmentMap {
     /// Twin of `environment_radiance`.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
         let (column, row, position) = self.locate(direction);
-        self.cell(column, row).interpolate(position)
+        let next_column = if column + 1 == self.width { 0 } else { column + 1 };
+        let along = |row: u32| {
+            let texel = |column| self.texels[row as usize * self.width as usize + column as usize];
+            texel(column).lerp(texel(next_column), position.x)
+        };
+        along(row.saturating_sub(1)).lerp(along(row.min(self.height - 1)), position.y)
     }
 }
