@@ -23,12 +23,8 @@ const TEXEL_BYTES: u64 = 48;
 /// Largest compression of a Radiance file: a run of 255 texels of four bytes in four bytes.
 const HDR_LARGEST_RATIO: u64 = 255;
 
-/// Radiance as stored in the file, top row first.
-struct Image {
-    width: u32,
-    height: u32,
-    texels: Vec<Vec3>,
-}
+/// Width, height, and radiance as stored in the file, top row first.
+type Image = ([u32; 2], Vec<Vec3>);
 
 impl EnvironmentMap {
     /// Reads a lat-long map in the format of its extension: `.hdr`, `.exr` or `.pfm`.
@@ -68,8 +64,7 @@ impl EnvironmentMap {
             return Err(format!("{width}×{height} texels, found {} pixels", pixels.len()));
         }
         let texels = pixels.iter().map(|pixel| Vec3::from(*pixel)).collect();
-        let mut map = Self { width, height, texels, rotation_rad: 0.0, source: name.to_owned() };
-        map.clean(scale, warnings);
+        let map = Self::cleaned(name.to_owned(), ([width, height], texels), scale, warnings);
         Ok(map.placed(rotation_deg, warnings))
     }
 
@@ -103,21 +98,13 @@ impl EnvironmentMap {
             }
         };
         let image = read(&files::read(path)?).map_err(|message| Error::format(path, message))?;
-        let mut map = Self {
-            width: image.width,
-            height: image.height,
-            texels: image.texels,
-            rotation_rad: 0.0,
-            source: path.display().to_string(),
-        };
-        map.clean(scale, warnings);
-        Ok(map)
+        Ok(Self::cleaned(path.display().to_string(), image, scale, warnings))
     }
 
     /// Applies `scale`, and sets texels that are not radiance to 0 with a warning.
-    fn clean(&mut self, scale: f32, warnings: &mut Vec<String>) {
-        let invalid = self
-            .texels
+    fn cleaned(source: String, image: Image, scale: f32, warnings: &mut Vec<String>) -> Self {
+        let ([width, height], mut texels) = image;
+        let invalid = texels
             .par_iter_mut()
             .map(|texel| {
                 let scaled = *texel * scale;
@@ -130,12 +117,12 @@ impl EnvironmentMap {
             .sum::<usize>();
         if invalid > 0 {
             warnings.push(format!(
-                "{}: {invalid} of {} texels are negative, infinite (above {MAX_RADIANCE:e}) or NaN \
-                 and were set to 0",
-                self.source,
-                self.texels.len()
+                "{source}: {invalid} of {} texels are negative, infinite (above {MAX_RADIANCE:e}) or \
+                 NaN and were set to 0",
+                texels.len()
             ));
         }
+        Self { width, height, texels, rotation_rad: 0.0, source }
     }
 }
 
@@ -173,7 +160,7 @@ fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
         .map_err(|message| format!("not a readable Radiance file: {message}"))?;
     let mut components = vec![0_f32; width as usize * height as usize * 3];
     decoder.read_image(bytemuck::cast_slice_mut(&mut components)).map_err(message)?;
-    Ok(Image { width, height, texels: bytemuck::cast_vec(components) })
+    Ok(([width, height], bytemuck::cast_vec(components)))
 }
 
 fn read_exr(bytes: &[u8]) -> Result<Image, String> {
@@ -183,8 +170,7 @@ fn read_exr(bytes: &[u8]) -> Result<Image, String> {
             .map_err(|message| format!("not a readable OpenEXR file: {message}"))
     };
     let texel = |(): &mut (), [r, g, b, _]: [f32; 4]| Vec3::new(r, g, b);
-    let ([width, height], texels, ()) = exr::decode(bytes, check, texel)?;
-    Ok(Image { width, height, texels })
+    exr::decode(bytes, check, texel).map(|(size, texels, ())| (size, texels))
 }
 
 /// Reads a portable float map: `PF` or `Pf`, width, height, scale (negative for little-endian),
@@ -239,5 +225,5 @@ fn read_pfm(bytes: &[u8]) -> Result<Image, String> {
             _ => Vec3::new(float(texel), float(&texel[4..]), float(&texel[8..])),
         }));
     }
-    Ok(Image { width, height, texels })
+    Ok(([width, height], texels))
 }
