@@ -1,6 +1,6 @@
 //! SHA-256 of everything that changes the picture.
 
-use glam::Vec3;
+use bytemuck::NoUninit;
 use sha2::{Digest, Sha256};
 
 use super::{Filter, Scene};
@@ -18,41 +18,40 @@ use crate::{
 /// Names, but for those of groups of lights, paths and the order of the text do not enter. A length precedes
 /// every array and a tag every variant, so that no two scenes give the same bytes.
 pub(crate) fn hash(scene: &Scene) -> String {
-    let mut hasher = Hasher(Sha256::new());
-    let camera = &scene.camera;
-    hasher.vectors(&[camera.position, camera.look_at, camera.up]);
-    hasher.floats(&[camera.vertical_fov_deg, camera.aperture_radius, camera.focus_distance]);
-    hasher.still(scene);
-    hasher.finish()
+    hashed(|hasher| {
+        let camera = &scene.camera;
+        hasher.array(&[camera.position, camera.look_at, camera.up]);
+        hasher.array(&[camera.vertical_fov_deg, camera.aperture_radius, camera.focus_distance]);
+        hasher.still(scene);
+    })
 }
 
 /// Hashes all but the camera; lower-case hexadecimal. It is the same as long as the camera alone moves.
 pub fn still_hash(scene: &Scene) -> String {
-    let mut hasher = Hasher(Sha256::new());
-    hasher.still(scene);
-    hasher.finish()
+    hashed(|hasher| hasher.still(scene))
 }
 
 /// Hashes the environment alone; lower-case hexadecimal.
 pub fn environment_hash(scene: &Scene) -> String {
-    let mut hasher = Hasher(Sha256::new());
-    hasher.environment(scene);
-    hasher.finish()
+    hashed(|hasher| hasher.environment(scene))
 }
 
 /// Hashes positions and triangles, all that can block light; lower-case hexadecimal.
 pub fn geometry_hash(scene: &Scene) -> String {
+    hashed(|hasher| {
+        let geometry = &scene.geometry;
+        for mesh in [geometry].into_iter().chain(&geometry.prototypes) {
+            hasher.array(&mesh.positions);
+            hasher.array(&mesh.triangles);
+        }
+        geometry.instances.iter().for_each(|instance| hasher.instance(instance));
+    })
+}
+
+fn hashed(feed: impl FnOnce(&mut Hasher)) -> String {
     let mut hasher = Hasher(Sha256::new());
-    hasher.array(bytemuck::cast_slice(&scene.geometry.positions));
-    hasher.array(bytemuck::cast_slice(&scene.geometry.triangles));
-    for prototype in &scene.geometry.prototypes {
-        hasher.array(bytemuck::cast_slice(&prototype.positions));
-        hasher.array(bytemuck::cast_slice(&prototype.triangles));
-    }
-    for instance in &scene.geometry.instances {
-        hasher.instance(instance);
-    }
-    hasher.finish()
+    feed(&mut hasher);
+    hexadecimal(&hasher.0.finalize())
 }
 
 /// Follows the tags of lamps.
@@ -69,7 +68,7 @@ impl Hasher {
             Filter::Box => 0,
             Filter::Gaussian => 1,
         };
-        self.integers(&[scene.film.width, scene.film.height, filter]);
+        self.array(&[scene.film.width, scene.film.height, filter]);
         self.environment(scene);
         self.length(scene.materials.len());
         for material in &scene.materials {
@@ -96,28 +95,24 @@ impl Hasher {
             self.light_group(lamp.light_group.as_deref());
         }
         for portal in &scene.portals {
-            self.integers(&[PORTAL_TAG]);
-            self.vectors(&[portal.corner, portal.axes[0], portal.axes[1]]);
-            self.floats(&portal.size);
+            self.array(&[PORTAL_TAG]);
+            self.array(&[portal.corner, portal.axes[0], portal.axes[1]]);
+            self.array(&portal.size);
         }
-    }
-
-    fn finish(self) -> String {
-        hexadecimal(&self.0.finalize())
     }
 
     fn environment(&mut self, scene: &Scene) {
         let environment = &scene.environment;
-        self.integers(&[environment.width, environment.height]);
-        self.floats(&[environment.rotation_rad]);
-        self.vectors(&environment.texels);
+        self.array(&[environment.width, environment.height]);
+        self.array(&[environment.rotation_rad]);
+        self.array(&environment.texels);
     }
 
     fn triangles(&mut self, geometry: &Geometry) {
-        self.array(bytemuck::cast_slice(&geometry.positions));
-        self.array(bytemuck::cast_slice(&geometry.normals));
-        self.array(bytemuck::cast_slice(&geometry.triangles));
-        self.array(bytemuck::cast_slice(&geometry.materials));
+        self.array(&geometry.positions);
+        self.array(&geometry.normals);
+        self.array(&geometry.triangles);
+        self.array(&geometry.materials);
     }
 
     fn attributes(&mut self, geometry: &Geometry) {
@@ -136,37 +131,26 @@ impl Hasher {
 
     fn instance(&mut self, instance: &Instance) {
         let Instance { prototype, world_from_object, first_material, material_mask } = *instance;
-        self.integers(&[prototype, first_material, material_mask]);
-        self.floats(world_from_object.map(|row| row.to_array()).as_flattened());
+        self.array(&[prototype, first_material, material_mask]);
+        self.array(&world_from_object);
     }
 
     fn length(&mut self, length: usize) {
         self.0.update((length as u64).to_le_bytes());
     }
 
-    fn array(&mut self, bytes: &[u8]) {
+    fn array<T: NoUninit>(&mut self, elements: &[T]) {
+        let bytes: &[u8] = bytemuck::cast_slice(elements);
         self.length(bytes.len());
         self.0.update(bytes);
     }
 
-    fn integers(&mut self, integers: &[u32]) {
-        self.array(bytemuck::cast_slice(integers));
-    }
-
-    fn floats(&mut self, floats: &[f32]) {
-        self.array(bytemuck::cast_slice(floats));
-    }
-
-    fn vectors(&mut self, vectors: &[Vec3]) {
-        self.array(bytemuck::cast_slice(vectors));
-    }
-
     fn material(&mut self, kind: &MaterialKind) {
         let (_, number, groups) = kind.parameters();
-        self.integers(&[number]);
-        groups.iter().for_each(|group| self.floats(group));
+        self.array(&[number]);
+        groups.iter().for_each(|group| self.array(group));
         if let MaterialKind::Measured { table, .. } = kind {
-            self.integers(table.words());
+            self.array(table.words());
         }
     }
 
@@ -184,11 +168,11 @@ impl Hasher {
             self.texture(texture.as_ref());
         }
         let cutoff = surface.opacity.cutoff.unwrap_or(-1.0);
-        self.floats(&[surface.normal_scale, surface.opacity.factor, cutoff]);
-        self.integers(&[u32::from(surface.vertex_color), u32::from(surface.two_sided)]);
+        self.array(&[surface.normal_scale, surface.opacity.factor, cutoff]);
+        self.array(&[u32::from(surface.vertex_color), u32::from(surface.two_sided)]);
         if let Some(emission) = emission {
-            self.vectors(&[emission.radiance]);
-            self.integers(&[u32::from(emission.two_sided)]);
+            self.array(&[emission.radiance]);
+            self.array(&[u32::from(emission.two_sided)]);
         }
         self.light_group(surface.light_group.as_deref());
     }
@@ -196,7 +180,7 @@ impl Hasher {
     /// Layers of lights depend on their groups.
     fn light_group(&mut self, name: Option<&str>) {
         if let Some(name) = name {
-            self.integers(&[LIGHT_GROUP_TAG]);
+            self.array(&[LIGHT_GROUP_TAG]);
             self.array(name.as_bytes());
         }
     }
@@ -207,35 +191,35 @@ impl Hasher {
             return;
         };
         let image = &used.texture;
-        self.integers(&[image.width, image.height, used.channels as u32, used.encoding as u32]);
-        self.integers(&[used.uv_set, used.wrap[0] as u32, used.wrap[1] as u32]);
-        self.integers(&[used.interpolation as u32]);
-        self.floats(used.image_from_uv.as_flattened());
-        self.floats(&[used.scale, used.bias].concat());
+        self.array(&[image.width, image.height, used.channels as u32, used.encoding as u32]);
+        self.array(&[used.uv_set, used.wrap[0] as u32, used.wrap[1] as u32]);
+        self.array(&[used.interpolation as u32]);
+        self.array(used.image_from_uv.as_flattened());
+        self.array(&[used.scale, used.bias].concat());
         match &image.texels {
-            Texels::Bytes(texels) => self.array(texels.as_flattened()),
+            Texels::Bytes(texels) => self.array(texels),
             Texels::Shorts(texels) => {
-                self.integers(&[1]);
-                self.array(bytemuck::cast_slice(texels));
+                self.array(&[1_u32]);
+                self.array(texels);
             }
-            Texels::Halves(texels) => self.array(bytemuck::cast_slice(texels)),
+            Texels::Halves(texels) => self.array(texels),
         }
     }
 
     fn lamp(&mut self, lamp: &LampKind) {
         match *lamp {
             LampKind::Point { position, intensity } => {
-                self.integers(&[0]);
-                self.vectors(&[position, intensity]);
+                self.array(&[0_u32]);
+                self.array(&[position, intensity]);
             }
             LampKind::Spot(spot) => {
-                self.integers(&[1, spot.falloff as u32]);
-                self.vectors(&[spot.position, spot.direction, spot.intensity]);
-                self.floats(&[spot.inner_angle_rad, spot.outer_angle_rad]);
+                self.array(&[1, spot.falloff as u32]);
+                self.array(&[spot.position, spot.direction, spot.intensity]);
+                self.array(&[spot.inner_angle_rad, spot.outer_angle_rad]);
             }
             LampKind::Directional { direction, irradiance } => {
-                self.integers(&[2]);
-                self.vectors(&[direction, irradiance]);
+                self.array(&[2_u32]);
+                self.array(&[direction, irradiance]);
             }
         }
     }
