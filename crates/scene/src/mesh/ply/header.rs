@@ -15,67 +15,56 @@ pub(super) enum Encoding {
     BinaryBigEndian,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
-    Int8,
-    Uint8,
-    Int16,
-    Uint16,
-    Int32,
-    Uint32,
-    Float32,
-    Float64,
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    Signed,
+    Unsigned,
+    Float,
+}
+
+/// Type of a number.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scalar {
+    kind: Kind,
+    pub(super) byte_count: usize,
 }
 
 impl Scalar {
-    pub(super) fn parse(name: &str) -> Option<Self> {
-        Some(match name {
-            "char" | "int8" => Self::Int8,
-            "uchar" | "uint8" => Self::Uint8,
-            "short" | "int16" => Self::Int16,
-            "ushort" | "uint16" => Self::Uint16,
-            "int" | "int32" => Self::Int32,
-            "uint" | "uint32" => Self::Uint32,
-            "float" | "float32" => Self::Float32,
-            "double" | "float64" => Self::Float64,
+    fn parse(name: &str) -> Option<Self> {
+        let (kind, byte_count) = match name {
+            "char" | "int8" => (Kind::Signed, 1),
+            "uchar" | "uint8" => (Kind::Unsigned, 1),
+            "short" | "int16" => (Kind::Signed, 2),
+            "ushort" | "uint16" => (Kind::Unsigned, 2),
+            "int" | "int32" => (Kind::Signed, 4),
+            "uint" | "uint32" => (Kind::Unsigned, 4),
+            "float" | "float32" => (Kind::Float, 4),
+            "double" | "float64" => (Kind::Float, 8),
             _ => return None,
-        })
-    }
-
-    pub(super) fn byte_count(self) -> usize {
-        match self {
-            Self::Int8 | Self::Uint8 => 1,
-            Self::Int16 | Self::Uint16 => 2,
-            Self::Int32 | Self::Uint32 | Self::Float32 => 4,
-            Self::Float64 => 8,
-        }
+        };
+        Some(Self { kind, byte_count })
     }
 
     /// Largest value of an integer, which stands for 1 in colours; none for floats.
     pub(super) fn largest(self) -> Option<f64> {
-        Some(match self {
-            Self::Int8 => f64::from(i8::MAX),
-            Self::Uint8 => f64::from(u8::MAX),
-            Self::Int16 => f64::from(i16::MAX),
-            Self::Uint16 => f64::from(u16::MAX),
-            Self::Int32 => f64::from(i32::MAX),
-            Self::Uint32 => f64::from(u32::MAX),
-            Self::Float32 | Self::Float64 => return None,
-        })
+        let bits = match self.kind {
+            Kind::Signed => 8 * self.byte_count - 1,
+            Kind::Unsigned => 8 * self.byte_count,
+            Kind::Float => return None,
+        };
+        Some(((1_u64 << bits) - 1) as f64)
     }
 
-    /// Value of little-endian bytes; every type fits a double exactly.
+    /// Value of little-endian bytes, with zeros after its own; every type fits a double exactly.
     pub(super) fn value(self, bytes: [u8; 8]) -> f64 {
-        let [a, b, c, d, ..] = bytes;
-        match self {
-            Self::Int8 => f64::from(i8::from_le_bytes([a])),
-            Self::Uint8 => f64::from(a),
-            Self::Int16 => f64::from(i16::from_le_bytes([a, b])),
-            Self::Uint16 => f64::from(u16::from_le_bytes([a, b])),
-            Self::Int32 => f64::from(i32::from_le_bytes([a, b, c, d])),
-            Self::Uint32 => f64::from(u32::from_le_bytes([a, b, c, d])),
-            Self::Float32 => f64::from(f32::from_le_bytes([a, b, c, d])),
-            Self::Float64 => f64::from_le_bytes(bytes),
+        let word = u64::from_le_bytes(bytes);
+        let unused_bits = 64 - 8 * self.byte_count;
+        match self.kind {
+            // Shifting right repeats the sign.
+            Kind::Signed => ((word << unused_bits).cast_signed() >> unused_bits) as f64,
+            Kind::Unsigned => word as f64,
+            Kind::Float if self.byte_count == 4 => f64::from(f32::from_bits(word as u32)),
+            Kind::Float => f64::from_bits(word),
         }
     }
 }
@@ -100,7 +89,7 @@ impl Element {
     pub(super) fn least_bytes(&self, encoding: Encoding) -> u64 {
         let of_property = |property: &Property| match encoding {
             Encoding::Ascii => 2,
-            _ => property.list_count.unwrap_or(property.value).byte_count() as u64,
+            _ => property.list_count.unwrap_or(property.value).byte_count as u64,
         };
         self.properties.iter().map(of_property).sum::<u64>().saturating_mul(self.count)
     }

@@ -84,7 +84,13 @@ fn read_from<R: BufRead>(path: &Path, reader: R, file_bytes: u64) -> Result<Mesh
                      faces",
                 ));
             }
-            _ => source.skip(element)?,
+            _ => {
+                for index in 0..element.count {
+                    for property in &element.properties {
+                        source.skip(property, Place { element, index })?;
+                    }
+                }
+            }
         }
     }
     polygons.triangulate_into(&mut mesh);
@@ -175,10 +181,9 @@ impl<R: BufRead> Source<'_, R> {
         for index in 0..element.count {
             for (property, value) in element.properties.iter().zip(&mut row) {
                 let place = Place { element, index };
-                if let Some(count) = property.list_count {
-                    self.skip_list(count, property, place)?;
-                } else {
-                    *value = self.scalar(property.value, place)?;
+                match property.list_count {
+                    Some(_) => self.skip(property, place)?,
+                    None => *value = self.scalar(property.value, place)?,
                 }
             }
             let vector = |columns: [Option<usize>; 3]| {
@@ -251,35 +256,16 @@ impl<R: BufRead> Source<'_, R> {
                             }
                         }
                     }
-                    Some(count) => self.skip_list(count, property, place)?,
-                    None => {
-                        self.scalar(property.value, place)?;
-                    }
+                    _ => self.skip(property, place)?,
                 }
             }
         }
         Ok(())
     }
 
-    fn skip(&mut self, element: &Element) -> Result<()> {
-        for index in 0..element.count {
-            for property in &element.properties {
-                let place = Place { element, index };
-                if let Some(count) = property.list_count {
-                    self.skip_list(count, property, place)?;
-                } else {
-                    self.scalar(property.value, place)?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn skip_list(&mut self, count: Scalar, property: &Property, place: Place) -> Result<()> {
-        for _ in 0..self.list_count(count, place)? {
-            self.scalar(property.value, place)?;
-        }
-        Ok(())
+    fn skip(&mut self, property: &Property, place: Place) -> Result<()> {
+        let count = property.list_count.map_or(Ok(1), |count| self.list_count(count, place))?;
+        (0..count).try_for_each(|_| self.scalar(property.value, place).map(drop))
     }
 
     fn list_count(&mut self, count_type: Scalar, place: Place) -> Result<u64> {
@@ -295,7 +281,7 @@ impl<R: BufRead> Source<'_, R> {
         if self.encoding == Encoding::Ascii {
             return self.ascii_scalar(place);
         }
-        let byte_count = scalar.byte_count();
+        let byte_count = scalar.byte_count;
         let mut bytes = [0_u8; 8];
         match self.reader.read_exact(&mut bytes[..byte_count]) {
             Ok(()) => {}
