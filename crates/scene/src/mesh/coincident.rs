@@ -141,27 +141,15 @@ impl Mesh {
             let shift = normal * (steps * STEP * largest.log2().ceil().exp2());
             let direction = (normal * DIRECTION_STEPS).round().as_ivec3();
             let corners = corners.map(|corner| {
-                *vertices
-                    .entry((corner, direction, steps.to_bits()))
-                    .or_insert_with(|| self.push_moved(corner as usize, shift))
+                *vertices.entry((corner, direction, steps.to_bits())).or_insert_with(|| {
+                    let Some(copy) = self.repeat_vertex(corner) else { return corner };
+                    let place = &mut self.positions[copy as usize];
+                    *place = (Vec3::from(*place) + shift).to_array();
+                    copy
+                })
             });
             self.triangles[triangle as usize] = corners;
         }
-    }
-
-    fn push_moved(&mut self, vertex: usize, shift: Vec3) -> u32 {
-        fn repeat<T: Copy>(all: &mut Vec<T>, vertex: usize) {
-            if let Some(&own) = all.get(vertex) {
-                all.push(own);
-            }
-        }
-        let place = Vec3::from(self.positions[vertex]) + shift;
-        self.positions.push(place.to_array());
-        repeat(&mut self.normals, vertex);
-        self.uvs.iter_mut().for_each(|uvs| repeat(uvs, vertex));
-        repeat(&mut self.tangents, vertex);
-        repeat(&mut self.colors, vertex);
-        self.positions.len() as u32 - 1
     }
 }
 

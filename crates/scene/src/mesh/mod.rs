@@ -11,7 +11,10 @@ pub mod obj;
 pub mod ply;
 mod tangents;
 
-use std::path::{Path, PathBuf};
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
 use glam::Mat4;
 
@@ -225,9 +228,8 @@ impl Mesh {
     /// Materials of at least one triangle.
     pub fn used_materials(&self) -> impl Iterator<Item = &MeshMaterial> {
         let mut used = vec![false; self.materials.len()];
-        let ends = self.runs.iter().skip(1).map(|run| run.first_triangle);
-        for (run, end) in self.runs.iter().zip(ends.chain([self.triangles.len()])) {
-            if let Some(material) = run.material.filter(|_| run.first_triangle < end) {
+        for (triangles, material) in self.material_runs() {
+            if let Some(material) = material.filter(|_| !triangles.is_empty()) {
                 used[material] = true;
             }
         }
@@ -235,6 +237,29 @@ impl Mesh {
             used[repeated] = true;
         }
         self.materials.iter().zip(used).filter_map(|(material, used)| used.then_some(material))
+    }
+
+    /// Triangles of each run, with its material.
+    fn material_runs(&self) -> impl Iterator<Item = (Range<usize>, Option<usize>)> {
+        let ends = self.runs.iter().skip(1).map(|run| run.first_triangle);
+        let runs = self.runs.iter().zip(ends.chain([self.triangles.len()]));
+        runs.map(|(run, end)| (run.first_triangle..end, run.material))
+    }
+
+    /// Adds a vertex like another; none if there is no room.
+    fn repeat_vertex(&mut self, vertex: u32) -> Option<u32> {
+        fn repeat<T: Copy>(all: &mut Vec<T>, vertex: u32) {
+            if let Some(&own) = all.get(vertex as usize) {
+                all.push(own);
+            }
+        }
+        let copy = u32::try_from(self.positions.len()).ok()?;
+        repeat(&mut self.positions, vertex);
+        repeat(&mut self.normals, vertex);
+        self.uvs.iter_mut().for_each(|uvs| repeat(uvs, vertex));
+        repeat(&mut self.tangents, vertex);
+        repeat(&mut self.colors, vertex);
+        Some(copy)
     }
 
     fn start_object(&mut self, name: &str) {

@@ -34,13 +34,11 @@ impl Mesh {
     /// Triangles that need tangents along u of a set of texture coordinates.
     fn faces_without_tangents(&self, uv_set: u32) -> Vec<usize> {
         let mut faces = Vec::new();
-        let ends = self.runs.iter().skip(1).map(|run| run.first_triangle);
-        for (run, end) in self.runs.iter().zip(ends.chain([self.triangles.len()])) {
-            let normal = run
-                .material
+        for (triangles, material) in self.material_runs() {
+            let normal = material
                 .and_then(|material| self.materials[material].material.surface.normal.as_ref());
             if normal.is_some_and(|normal| normal.uv_set == uv_set) {
-                faces.extend((run.first_triangle..end).filter(|&face| {
+                faces.extend(triangles.filter(|&face| {
                     let has_none = |&vertex: &u32| {
                         self.tangents.get(vertex as usize).is_none_or(|t| t[..3] == [0.0; 3])
                     };
@@ -64,28 +62,14 @@ impl Mesh {
                 self.tangents[vertex as usize] = tangent;
             } else if found != tangent {
                 let key = (vertex, tangent.map(f32::to_bits));
-                let copy = *copies.entry(key).or_insert_with(|| self.copy_vertex(vertex, tangent));
+                let copy = *copies.entry(key).or_insert_with(|| {
+                    let Some(copy) = self.repeat_vertex(vertex) else { return vertex };
+                    self.tangents[copy as usize] = tangent;
+                    copy
+                });
                 self.triangles[place.0][place.1] = copy;
             }
         }
-    }
-
-    /// Adds a vertex that differs from another in its tangent; returns the other if there is no room.
-    fn copy_vertex(&mut self, vertex: u32, tangent: [f32; 4]) -> u32 {
-        let Ok(copy) = u32::try_from(self.positions.len()) else { return vertex };
-        let vertex = vertex as usize;
-        self.positions.push(self.positions[vertex]);
-        self.tangents.push(tangent);
-        if !self.normals.is_empty() {
-            self.normals.push(self.normals[vertex]);
-        }
-        for uvs in self.uvs.iter_mut().filter(|uvs| !uvs.is_empty()) {
-            uvs.push(uvs[vertex]);
-        }
-        if !self.colors.is_empty() {
-            self.colors.push(self.colors[vertex]);
-        }
-        copy
     }
 }
 
