@@ -60,19 +60,20 @@ impl Instance {
         first_material: u32,
         replaces: bool,
     ) -> Option<Self> {
-        let linear = transform.linear.transpose();
-        let row = |row: Vec3, shift: f32| row.extend(shift);
-        let instance = Self {
-            prototype,
-            world_from_object: [
-                row(linear.x_axis, transform.translate.x),
-                row(linear.y_axis, transform.translate.y),
-                row(linear.z_axis, transform.translate.z),
-            ],
-            first_material,
-            material_mask: if replaces { 0 } else { u32::MAX },
-        };
-        instance.object_from_world().map(|_| instance)
+        let material_mask = if replaces { 0 } else { u32::MAX };
+        let world_from_object = [Vec4::ZERO; 3];
+        Self { prototype, world_from_object, first_material, material_mask }
+            .placed(affine(transform))
+    }
+
+    /// The same instance with another affine map from the space of the mesh to the world.
+    fn placed(self, map: DAffine3) -> Option<Self> {
+        let [x, y, z] = map.matrix3.transpose().to_cols_array_2d().map(DVec3::from);
+        let row = |row: DVec3, shift: f64| row.extend(shift).as_vec4();
+        let shift = map.translation;
+        let world_from_object = [row(x, shift.x), row(y, shift.y), row(z, shift.z)];
+        let placed = Self { world_from_object, ..self };
+        placed.object_from_world().map(|_| placed)
     }
 
     /// Affine map from the space of the mesh to the world.
@@ -107,21 +108,7 @@ impl Instance {
 
     /// Moves the instance by a further transform.
     pub fn moved(&self, outer: &Transform) -> Option<Self> {
-        let outer =
-            DAffine3 { matrix3: outer.linear.as_dmat3(), translation: outer.translate.as_dvec3() };
-        let whole = outer * self.affine();
-        let linear = whole.matrix3.transpose();
-        let shift = whole.translation;
-        let row = |row: DVec3, shift: f64| row.extend(shift).as_vec4();
-        let moved = Self {
-            world_from_object: [
-                row(linear.x_axis, shift.x),
-                row(linear.y_axis, shift.y),
-                row(linear.z_axis, shift.z),
-            ],
-            ..*self
-        };
-        moved.object_from_world().map(|_| moved)
+        self.placed(affine(outer) * self.affine())
     }
 
     /// Corners of a box in the space of the mesh, in the world.
@@ -131,6 +118,11 @@ impl Instance {
             self.position(Vec3::new(pick(0), pick(1), pick(2)))
         })
     }
+}
+
+fn affine(transform: &Transform) -> DAffine3 {
+    let (matrix3, translation) = (transform.linear.as_dmat3(), transform.translate.as_dvec3());
+    DAffine3 { matrix3, translation }
 }
 
 /// Box around positions; none without any.
