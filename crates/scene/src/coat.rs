@@ -115,7 +115,11 @@ fn microfacets(alpha: f32, ior: f32, cosine: f32, reflects: bool) -> f32 {
             return 0.0;
         }
         let refracted = 1.0 - (1.0 - met * met) / (ior * ior);
-        let fresnel = if refracted <= 0.0 { 1.0 } else { fresnel_interface(met, ior) };
+        let fresnel = match refracted {
+            ..=0.0 => 1.0,
+            _ if ior >= 1.0 => fresnel_dielectric(met, ior),
+            inside => fresnel_dielectric(inside.sqrt(), ior.recip()),
+        };
         let (away, kept, is_kept) = if reflects {
             let away = 2.0 * met * normal - to;
             (away, fresnel, away.z > 0.0)
@@ -130,15 +134,6 @@ fn microfacets(alpha: f32, ior: f32, cosine: f32, reflects: bool) -> f32 {
         density * kept * seen(to) * seen(away) * met / (cosine * normal_z)
     };
     (0..STEPS * STEPS).map(share).sum::<f32>() / (STEPS * STEPS) as f32
-}
-
-/// Reflectance of an interface at which light may be reflected totally.
-fn fresnel_interface(cosine: f32, ior: f32) -> f32 {
-    if ior >= 1.0 {
-        return fresnel_dielectric(cosine, ior);
-    }
-    let inside = 1.0 - (1.0 - cosine * cosine) / (ior * ior);
-    if inside <= 0.0 { 1.0 } else { fresnel_dielectric(inside.sqrt(), ior.recip()) }
 }
 
 /// Factor from the albedo of the diffuse base of Mitsuba's `principled` to that of glTF's material, which is
