@@ -288,11 +288,10 @@ fn identity(path: &Path) -> Option<(PathBuf, [u64; 2])> {
         use std::os::unix::fs::MetadataExt;
         return Some((PathBuf::new(), [metadata.dev(), metadata.ino()]));
     }
-    let canonical = path.canonicalize().ok().or_else(|| {
-        let folder = path.parent().filter(|folder| *folder != Path::new(""));
-        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
-        Some(folder.join(path.file_name()?))
-    });
+    let canonical = path
+        .canonicalize()
+        .ok()
+        .or_else(|| Some(parent_of(path).canonicalize().ok()?.join(path.file_name()?)));
     canonical.map(|path| (path, [0; 2]))
 }
 

@@ -131,12 +131,11 @@ impl Geometry {
         material_of: impl Fn(usize) -> u32,
     ) -> Dropped {
         let mut dropped = Dropped::default();
-        let first_vertex = self.positions.len();
+        let first = self.positions.len();
         assert!(
-            u32::try_from(first_vertex + mesh.positions.len()).is_ok(),
+            u32::try_from(first + mesh.positions.len()).is_ok(),
             "vertices are counted before they are appended"
         );
-        let first_vertex = first_vertex as u32;
         self.positions.extend(mesh.positions.iter().map(|&position| transform.position(position)));
         if mesh.normals.is_empty() {
             self.normals.resize(self.positions.len(), [0.0; 3]);
@@ -149,17 +148,11 @@ impl Geometry {
         }
         let count = self.positions.len();
         for (uvs, own) in self.uvs.iter_mut().zip(&mesh.uvs) {
-            extend(uvs, own, first_vertex as usize, count, [0.0; 2], |&uv| finite_or(uv, [0.0; 2]));
+            extend(uvs, own, first, count, [0.0; 2], |&uv| finite_or(uv, [0.0; 2]));
         }
-        extend(
-            &mut self.tangents,
-            &mesh.tangents,
-            first_vertex as usize,
-            count,
-            [0.0; 4],
-            |&tangent| transform.tangent(tangent),
-        );
-        extend(&mut self.colors, &mesh.colors, first_vertex as usize, count, [1.0; 4], |&color| {
+        let tangent = |&tangent: &[f32; 4]| transform.tangent(tangent);
+        extend(&mut self.tangents, &mesh.tangents, first, count, [0.0; 4], tangent);
+        extend(&mut self.colors, &mesh.colors, first, count, [1.0; 4], |&color| {
             finite_or(color, [1.0; 4]).map(|channel| channel.clamp(0.0, 1.0))
         });
         let mut objects = mesh.objects.iter().peekable();
@@ -167,7 +160,7 @@ impl Geometry {
             while let Some(object) = objects.next_if(|start| start.first_triangle <= index) {
                 self.start_object(&object.name);
             }
-            let [a, b, c] = triangle.map(|corner| first_vertex + corner);
+            let [a, b, c] = triangle.map(|corner| first as u32 + corner);
             let corners = [a, b, c].map(|corner| self.positions[corner as usize]);
             if !corners.iter().all(|corner| is_finite(*corner)) {
                 dropped.non_finite += 1;
@@ -178,7 +171,7 @@ impl Geometry {
                 self.materials.push(material_of(index));
             }
         }
-        for position in &mut self.positions[first_vertex as usize..] {
+        for position in &mut self.positions[first..] {
             if !is_finite(*position) {
                 *position = transform.translate.to_array();
             }
@@ -206,10 +199,10 @@ pub(crate) fn extend<T: Clone>(
 }
 
 fn finite_or<const N: usize>(vector: [f32; N], otherwise: [f32; N]) -> [f32; N] {
-    if vector.iter().all(|component| component.is_finite()) { vector } else { otherwise }
+    if is_finite(vector) { vector } else { otherwise }
 }
 
-fn is_finite(vector: [f32; 3]) -> bool {
+fn is_finite<const N: usize>(vector: [f32; N]) -> bool {
     vector.iter().all(|component| component.is_finite())
 }
 

@@ -100,7 +100,9 @@ pub fn room() -> u64 {
 /// Returns the limit that leaves the least.
 fn tightest_bound() -> Bound {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let memory = Bound { set_by: "--max-memory", limit: limit(), in_use: in_use(&status) };
+    // Where the system has no `/proc`, nothing is known to be in use.
+    let in_use = kibibytes(&status, "VmRSS:").unwrap_or(0);
+    let memory = Bound { set_by: "--max-memory", limit: limit(), in_use };
     match address_space(&status) {
         Some(space) if space.room() < memory.room() => space,
         _ => memory,
@@ -152,11 +154,6 @@ pub fn check(asker: impl fmt::Display, bytes: u64) -> Result<(), Shortage> {
 /// The request does not fit.
 pub fn check_count(asker: impl fmt::Display, count: usize, size: usize) -> Result<(), Shortage> {
     check(asker, (count as u64).saturating_mul(size as u64))
-}
-
-/// Resident memory of the process with this status, bytes; 0 where the system has no `/proc`.
-fn in_use(status: &str) -> u64 {
-    kibibytes(status, "VmRSS:").unwrap_or(0)
 }
 
 /// Memory of the machine, or less in a container that has a limit.
