@@ -14,7 +14,7 @@ use crate::{
     Geometry,
     material::Material,
     math::colour::luminance,
-    texture::{Channels, Encoding, Texels, Texture, TextureUse, lookup::wrapped_texel},
+    texture::{Texels, Texture, TextureUse, lookup::wrapped_texel},
 };
 
 /// Heights, in units of the scene, that stand in the place of the normals of materials.
@@ -116,14 +116,7 @@ fn normals(heights: &TextureUse, images_per_unit: Vec2) -> TextureUse {
         (0.5 * normal + 0.5).extend(1.0).to_array().map(f16::from_f32)
     };
     let texels = Texels::Halves((0..values.len()).into_par_iter().map(texel).collect());
-    TextureUse {
-        texture: Arc::new(Texture { name: name.clone(), width, height, texels }),
-        channels: Channels::Color,
-        encoding: Encoding::Linear,
-        scale: [1.0; 3],
-        bias: [0.0; 3],
-        ..heights.clone()
-    }
+    heights.clone().showing(Arc::new(Texture { name: name.clone(), width, height, texels }))
 }
 
 #[cfg(test)]
@@ -135,6 +128,7 @@ mod tests {
         material::{MaterialKind, Surface},
         mesh::Mesh,
         quadrics,
+        texture::Encoding,
         texture::Wrap,
         transform::Transform,
     };

@@ -65,14 +65,13 @@ impl TextureUse {
     pub(crate) fn with_texels(&self, of: impl Fn([f32; 4]) -> [f32; 4] + Sync) -> Self {
         let texel = |value: [f32; 4]| of(value).map(f16::from_f32);
         let texels = Texels::Halves(self.values().into_par_iter().map(texel).collect());
-        Self {
-            texture: Arc::new(Texture { texels, ..Texture::clone(&self.texture) }),
-            channels: Channels::Color,
-            encoding: Encoding::Linear,
-            scale: [1.0; 3],
-            bias: [0.0; 3],
-            ..self.clone()
-        }
+        self.clone().showing(Arc::new(Texture { texels, ..Texture::clone(&self.texture) }))
+    }
+
+    /// Lays an image of linear values in the place of the own one.
+    pub(crate) fn showing(self, texture: Arc<Texture>) -> Self {
+        let (channels, encoding) = (Channels::Color, Encoding::Linear);
+        Self { texture, channels, encoding, scale: [1.0; 3], bias: [0.0; 3], ..self }
     }
 
     /// Returns factor · value + shift.

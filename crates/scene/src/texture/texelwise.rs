@@ -6,7 +6,7 @@ use glam::{Vec2, Vec4};
 use half::f16;
 use rayon::prelude::*;
 
-use super::{Channels, Encoding, Texels, Texture, TextureUse};
+use super::{Channels, Texels, Texture, TextureUse};
 
 /// Images of a metallic-roughness material.
 pub(crate) struct Converted {
@@ -64,14 +64,7 @@ impl Texelwise {
             let name = format!("{}, as metallic-roughness", name.unwrap_or_default());
             let texture = Arc::new(Texture { name, width, height, texels });
             let place = self.first.clone().unwrap_or_else(|| TextureUse::new(Arc::clone(&texture)));
-            TextureUse {
-                channels: Channels::Color,
-                encoding: Encoding::Linear,
-                scale: [1.0; 3],
-                bias: [0.0; 3],
-                texture,
-                ..place
-            }
+            place.showing(texture)
         };
         let packed = image(Texels::Bytes(packed));
         Converted {
