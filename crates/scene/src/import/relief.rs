@@ -128,8 +128,7 @@ mod tests {
         material::{MaterialKind, Surface},
         mesh::Mesh,
         quadrics,
-        texture::Encoding,
-        texture::Wrap,
+        texture::{Encoding, Wrap},
         transform::Transform,
     };
 
