@@ -80,12 +80,10 @@ fn a_guide_is_carried_and_finished_frames_are_skipped() {
 #[test]
 fn a_scene_that_moves_is_loaded_for_every_frame() {
     let folder = folder();
-    let attribute =
-        |name, kind, data: &[f32]| Attribute(name, 5126, kind, false, gltf::floats(data));
     let attributes = [
-        attribute("POSITION", "VEC3", &[-0.5, 0., 1., 0.5, 0., 1., 0., 1., 1.]),
-        attribute("_TIMES", "SCALAR", &[0., 0.1, 0.25]),
-        attribute("_SHIFTS", "VEC3", &[0., 0., 0., 0., 0.2, 0., 0., 0.5, 0.]),
+        Attribute::floats("POSITION", "VEC3", &[-0.5, 0., 1., 0.5, 0., 1., 0., 1., 1.]),
+        Attribute::floats("_TIMES", "SCALAR", &[0., 0.1, 0.25]),
+        Attribute::floats("_SHIFTS", "VEC3", &[0., 0., 0., 0., 0.2, 0., 0., 0.5, 0.]),
     ];
     let ride = r#", "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path":
         "translation"}}], "samplers": [{"input": 1, "output": 2}]}]"#;

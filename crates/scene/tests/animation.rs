@@ -4,7 +4,7 @@
 use fenestra_scene::{Error, Scene, load::LoadOptions, still_hash};
 use glam::Vec3;
 
-use crate::support::gltf::{Attribute, floats, gltf_of};
+use crate::support::gltf::{Attribute, gltf_of};
 
 fn at(name: &str, text: &str, time: Option<f32>) -> Result<Scene, Error> {
     let folder = tempfile::tempdir().unwrap();
@@ -58,38 +58,20 @@ fn the_camera_follows_its_key_frames() {
 /// A triangle, keys at 1, 2 and 4 s, and values for shifts, turns about Y and shifts with slopes.
 fn document(channels: &str, samplers: &str) -> String {
     let half = 0.5_f32.sqrt();
+    // Along X, the slope after the first key is 2; the second has the slope 8 before it, the value 3 and the
+    // slope 4 after it.
+    let mut cubic = [0.0; 27];
+    [cubic[6], cubic[9], cubic[12], cubic[15]] = [2.0, 8.0, 3.0, 4.0];
     let attributes = [
-        Attribute("POSITION", 5126, "VEC3", false, floats(&[0., 0., 0., 1., 0., 0., 0., 1., 0.])),
-        Attribute("_TIMES", 5126, "SCALAR", false, floats(&[1.0, 2.0, 4.0])),
-        Attribute("_SHIFTS", 5126, "VEC3", false, floats(&[0., 0., 0., 0., 0., 4., 8., 0., 4.])),
-        Attribute(
+        Attribute::floats("POSITION", "VEC3", &[0., 0., 0., 1., 0., 0., 0., 1., 0.]),
+        Attribute::floats("_TIMES", "SCALAR", &[1.0, 2.0, 4.0]),
+        Attribute::floats("_SHIFTS", "VEC3", &[0., 0., 0., 0., 0., 4., 8., 0., 4.]),
+        Attribute::floats(
             "_TURNS",
-            5126,
             "VEC4",
-            false,
-            floats(&[0., 0., 0., 1., 0., -half, 0., -half, 0., 0., 0., 1.]),
+            &[0., 0., 0., 1., 0., -half, 0., -half, 0., 0., 0., 1.],
         ),
-        Attribute(
-            "_CUBIC",
-            5126,
-            "VEC3",
-            false,
-            floats(&[0.0; 27].map({
-                let mut index = 0;
-                move |_: f32| {
-                    index += 1;
-                    // Along X, the slope after the first key is 2; the second has the slope 8 before
-                    // it, the value 3 and the slope 4 after it.
-                    match index {
-                        7 => 2.0,
-                        10 => 8.0,
-                        13 => 3.0,
-                        16 => 4.0,
-                        _ => 0.0,
-                    }
-                }
-            })),
-        ),
+        Attribute::floats("_CUBIC", "VEC3", &cubic),
     ];
     let rest = format!(
         r#", "animations": [{{"name": "ride", "channels": [{channels}], "samplers": [{samplers}]}}]"#

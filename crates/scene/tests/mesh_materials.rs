@@ -13,7 +13,7 @@ use glam::Vec3;
 
 use crate::support::{
     folder::{self, Folder},
-    gltf::{Attribute, base64, floats, gltf, gltf_of, png},
+    gltf::{Attribute, base64, gltf, gltf_of, png},
 };
 
 /// Positions of a triangle in the plane z = 0, and its texture coordinates, v downwards.
@@ -21,12 +21,12 @@ const CORNERS: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 const COORDINATES: [f32; 6] = [0.0, 1.0, 1.0, 1.0, 0.0, 0.0];
 
 fn positions() -> Attribute<'static> {
-    Attribute("POSITION", 5126, "VEC3", false, floats(&CORNERS))
+    Attribute::floats("POSITION", "VEC3", &CORNERS)
 }
 
 /// Loads the material of a triangle with texture coordinates from `folder`.
 fn gltf_material(folder: &Folder, material: &str, rest: &str) -> (Material, Vec<String>) {
-    let uvs = Attribute("TEXCOORD_0", 5126, "VEC2", false, floats(&COORDINATES));
+    let uvs = Attribute::floats("TEXCOORD_0", "VEC2", &COORDINATES);
     let text = gltf_of(&[positions(), uvs], 3, material, rest);
     let mut warnings = Vec::new();
     let mesh = Mesh::read(&folder.write("a.gltf", text), &mut warnings).unwrap();
@@ -304,8 +304,8 @@ fn transmission_by_texture_is_glass_where_it_says_so() {
     let corners = [&CORNERS[..], &CORNERS.map(|coordinate| coordinate + 2.0)].concat();
     let uvs = [0.1, 0.5, 0.2, 0.5, 0.1, 0.6, 0.8, 0.5, 0.9, 0.5, 0.8, 0.6];
     let attributes = [
-        Attribute("POSITION", 5126, "VEC3", false, floats(&corners)),
-        Attribute("TEXCOORD_0", 5126, "VEC2", false, floats(&uvs)),
+        Attribute::floats("POSITION", "VEC3", &corners),
+        Attribute::floats("TEXCOORD_0", "VEC2", &uvs),
     ];
     let path = folder.write("a.gltf", gltf_of(&attributes, 6, material, rest));
     let scene = Scene::load(&path).unwrap();
@@ -367,8 +367,8 @@ fn quantized_attributes_are_numbers() {
 
 #[test]
 fn morph_targets_move_vertices_by_their_weights() {
-    let target = floats(&[0.0, 0.0, 2.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0]);
-    let attributes = [positions(), Attribute("_TARGET", 5126, "VEC3", false, target)];
+    let target = [0.0, 0.0, 2.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0];
+    let attributes = [positions(), Attribute::floats("_TARGET", "VEC3", &target)];
     let text = gltf_of(&attributes, 3, "", "");
     let text = text.replace("}}]}]", r#"}, "targets": [{"POSITION": 1}]}], "weights": [0.5]}]"#);
     let folder = Folder::new();
@@ -387,19 +387,13 @@ fn joints_carry_the_vertices_of_a_skin() {
     let attributes = [
         positions(),
         Attribute("JOINTS_0", 5121, "VEC4", false, joints),
-        Attribute("WEIGHTS_0", 5126, "VEC4", false, floats(&weights)),
-        Attribute("_BINDS", 5126, "MAT4", false, floats(&[shift, twice, twice].concat())),
-        Attribute("NORMAL", 5126, "VEC3", false, floats(&[0.6, 0.8, 0.0].repeat(3))),
-        Attribute("TANGENT", 5126, "VEC4", false, floats(&[0.8, -0.6, 0.0, -1.0].repeat(3))),
+        Attribute::floats("WEIGHTS_0", "VEC4", &weights),
+        Attribute::floats("_BINDS", "MAT4", &[shift, twice, twice].concat()),
+        Attribute::floats("NORMAL", "VEC3", &[0.6, 0.8, 0.0].repeat(3)),
+        Attribute::floats("TANGENT", "VEC4", &[0.8, -0.6, 0.0, -1.0].repeat(3)),
         // A second set carries the last vertex as much as the first.
         Attribute("JOINTS_1", 5121, "VEC4", false, vec![0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]),
-        Attribute(
-            "WEIGHTS_1",
-            5126,
-            "VEC4",
-            false,
-            floats(&[0., 0., 0., 0., 0., 0., 0., 0., 0.5, 0., 0., 0.]),
-        ),
+        Attribute::floats("WEIGHTS_1", "VEC4", &[0., 0., 0., 0., 0., 0., 0., 0., 0.5, 0., 0., 0.]),
     ];
     let skins = r#", "skins": [{"joints": [1, 2], "inverseBindMatrices": 3}]"#;
     let nodes = r#""nodes": [{"mesh": 0, "skin": 0, "translation": [9, 9, 9]},
@@ -425,7 +419,7 @@ fn normal_maps_without_tangents_get_them() {
     let folder = Folder::new();
     folder.write("n.png", png([[128, 128, 255, 255]; 2]));
     let rest = r#", "images": [{"uri": "n.png"}], "textures": [{"source": 0}]"#;
-    let uvs = || Attribute("TEXCOORD_0", 5126, "VEC2", false, floats(&COORDINATES));
+    let uvs = || Attribute::floats("TEXCOORD_0", "VEC2", &COORDINATES);
     let material = r#"{"normalTexture": {"index": 0}}"#;
     let read = |attributes: &[Attribute], material: &str| {
         let path = folder.write("a.gltf", gltf_of(attributes, 3, material, rest));
@@ -440,16 +434,15 @@ fn normal_maps_without_tangents_get_them() {
         .enumerate()
         .map(|(i, c)| if i % 2 == 0 { 1.0 - c } else { *c })
         .collect();
-    let mirrored = Attribute("TEXCOORD_0", 5126, "VEC2", false, floats(&mirrored));
+    let mirrored = Attribute::floats("TEXCOORD_0", "VEC2", &mirrored);
     let mesh = read(&[positions(), mirrored], material);
     assert_eq!(mesh.tangents, [[-1.0, 0.0, 0.0, -1.0]; 3]);
     // Tangents of the file stay, and no normal map needs none.
-    let stored =
-        Attribute("TANGENT", 5126, "VEC4", false, floats(&[0.0, 1.0, 0.0, -1.0].repeat(3)));
+    let stored = Attribute::floats("TANGENT", "VEC4", &[0.0, 1.0, 0.0, -1.0].repeat(3));
     assert_eq!(read(&[positions(), uvs(), stored], material).tangents[0], [0.0, 1.0, 0.0, -1.0]);
     let mut some = [0.0, 1.0, 0.0, -1.0].repeat(3);
     some[..4].fill(0.0);
-    let some = Attribute("TANGENT", 5126, "VEC4", false, floats(&some));
+    let some = Attribute::floats("TANGENT", "VEC4", &some);
     let mesh = read(&[positions(), uvs(), some], material);
     assert_eq!((mesh.tangents.len(), mesh.tangents[0][..3].to_vec()), (3, vec![0.0; 3]));
     assert!(read(&[positions(), uvs()], "{}").tangents.is_empty());

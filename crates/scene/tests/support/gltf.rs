@@ -31,6 +31,12 @@ pub fn gltf(nodes: &str, materials: &str, primitive: &str, rest: &str) -> String
 /// One attribute of a mesh: name, component type, element type, normalized, bytes.
 pub struct Attribute<'a>(pub &'a str, pub u32, pub &'a str, pub bool, pub Vec<u8>);
 
+impl<'a> Attribute<'a> {
+    pub fn floats(name: &'a str, kind: &'a str, numbers: &[f32]) -> Self {
+        Self(name, 5126, kind, false, floats(numbers))
+    }
+}
+
 /// Little-endian bytes of floats.
 pub fn floats(floats: &[f32]) -> Vec<u8> {
     floats.iter().flat_map(|float| float.to_le_bytes()).collect()
