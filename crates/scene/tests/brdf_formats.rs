@@ -4,8 +4,7 @@
 
 use std::{
     f64::consts::{FRAC_PI_2, TAU},
-    fs,
-    path::{Path, PathBuf},
+    path::Path,
 };
 
 use fenestra_scene::measured::{
@@ -13,25 +12,13 @@ use fenestra_scene::measured::{
     merl::{FILE_BYTES, HEADER_BYTES, SCALES},
 };
 use glam::Vec3;
-use tempfile::TempDir;
 
-/// Writes a file into `folder`.
-fn file(folder: &TempDir, name: &str, content: &[u8]) -> PathBuf {
-    let path = folder.path().join(name);
-    fs::write(&path, content).unwrap();
-    path
-}
+use crate::support::{assert_contains, folder::Folder};
 
 /// Returns the error message for a file of this content.
 fn message(name: &str, content: &[u8]) -> String {
-    let folder = TempDir::new().unwrap();
-    MeasuredTable::load(&file(&folder, name, content)).unwrap_err().to_string()
-}
-
-fn assert_contains(message: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(message.contains(part), "{part:?} is missing in {message:?}");
-    }
+    let folder = Folder::new();
+    MeasuredTable::load(&folder.write(name, content)).unwrap_err().to_string()
 }
 
 /// Encodes a MERL file from its stored values, before the scales, by channel and cell.
@@ -62,8 +49,8 @@ fn merl_cells_lie_where_the_format_says() {
         let name = cell_name(rest / 90, rest % 90, phi);
         f64::from(name[channel]) / [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0][channel]
     });
-    let folder = TempDir::new().unwrap();
-    let table = MeasuredTable::load(&file(&folder, "named.binary", &bytes)).unwrap();
+    let folder = Folder::new();
+    let table = MeasuredTable::load(&folder.write("named.binary", bytes)).unwrap();
     assert_eq!(table.warnings, Vec::<String>::new());
     assert_eq!(table.invalid_cell_count, 0);
     let mut checked = 0;
@@ -114,8 +101,8 @@ fn merl_invalid_cells_are_filled_from_their_neighbours() {
             0.1 / SCALES[channel]
         }
     });
-    let folder = TempDir::new().unwrap();
-    let table = MeasuredTable::load(&file(&folder, "holes.binary", &bytes)).unwrap();
+    let folder = Folder::new();
+    let table = MeasuredTable::load(&folder.write("holes.binary", bytes)).unwrap();
     assert_eq!(table.invalid_cell_count, CELL_COUNT / 3 + 1);
     assert_contains(&table.warnings.join("\n"), &["2 cells that are not finite"]);
     for (theta_half, theta_difference, phi) in [(0, 0, 0), (61, 11, 103), (20, 70, 90), (3, 89, 0)]
@@ -175,8 +162,8 @@ fn cornell_text(value: f64) -> String {
 
 #[test]
 fn cornell_constant_samples_give_a_constant_grid() {
-    let folder = TempDir::new().unwrap();
-    let path = file(&folder, "grey.brdf", cornell_text(0.1).as_bytes());
+    let folder = Folder::new();
+    let path = folder.write("grey.brdf", cornell_text(0.1));
     let table = MeasuredTable::load(&path).unwrap();
     assert_eq!(table.warnings, Vec::<String>::new());
     let mut values = Vec::new();
@@ -195,10 +182,10 @@ fn cornell_constant_samples_give_a_constant_grid() {
 
 #[test]
 fn cornell_records_that_cannot_be_used_are_counted() {
-    let folder = TempDir::new().unwrap();
+    let folder = Folder::new();
     let mut text = cornell_text(0.1);
     text += "0.5 0 0.5 1  nan 0.1 0.1\n2.0 0 0.5 1  0.1 0.1 0.1\n0.5 0 inf 1  0.1 0.1 0.1\n";
-    let table = MeasuredTable::load(&file(&folder, "a.brdf", text.as_bytes())).unwrap();
+    let table = MeasuredTable::load(&folder.write("a.brdf", text)).unwrap();
     assert_contains(&table.warnings.join("\n"), &["3 records"]);
     let (outgoing, incident) = bin_directions(30, 20, 50);
     assert!(table.evaluate(outgoing, incident).is_finite());

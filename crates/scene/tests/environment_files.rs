@@ -1,10 +1,7 @@
 //! Environment maps from files and from parameters: values, repairs, warnings and refusals.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::Path};
 
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
@@ -16,7 +13,8 @@ use fenestra_scene::{
     math::{colour::luminance, frame::direction_from_lat_long},
 };
 use glam::{Vec2, Vec3};
-use tempfile::TempDir;
+
+use crate::support::folder::Folder;
 
 /// Texel of an 8×4 map. All differ, and RGBE and half floats hold them exactly.
 fn texel(index: usize) -> Vec3 {
@@ -25,12 +23,6 @@ fn texel(index: usize) -> Vec3 {
 
 fn texels() -> Vec<Vec3> {
     (0..32).map(texel).collect()
-}
-
-fn write(folder: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
-    let path = folder.path().join(name);
-    fs::write(&path, bytes).unwrap();
-    path
 }
 
 /// Loads a map with its warnings.
@@ -90,10 +82,10 @@ fn write_exr(path: &Path, channels: Vec<(&str, FlatSamples)>) {
 
 #[test]
 fn every_format_gives_the_same_map_with_the_first_row_on_top() {
-    let folder = TempDir::new().unwrap();
-    let mut paths = vec![write(&folder, "map.hdr", &hdr_bytes(8, 4, &texels()))];
+    let folder = Folder::new();
+    let mut paths = vec![folder.write("map.hdr", &hdr_bytes(8, 4, &texels()))];
     for (name, big_endian) in [("little.pfm", false), ("big.PFM", true)] {
-        paths.push(write(&folder, name, &pfm_bytes(8, 4, &texels(), big_endian, false)));
+        paths.push(folder.write(name, &pfm_bytes(8, 4, &texels(), big_endian, false)));
     }
     let component = |c: usize| texels().iter().map(move |texel| texel[c]).collect::<Vec<f32>>();
     let half = |c: usize| component(c).into_iter().map(half::f16::from_f32).collect::<Vec<_>>();
@@ -124,10 +116,10 @@ fn every_format_gives_the_same_map_with_the_first_row_on_top() {
 
 #[test]
 fn grey_files_give_grey_maps() {
-    let folder = TempDir::new().unwrap();
+    let folder = Folder::new();
     let grey: Vec<Vec3> = texels().iter().map(|texel| Vec3::splat(texel.x)).collect();
     for big_endian in [false, true] {
-        let path = write(&folder, "grey.pfm", &pfm_bytes(8, 4, &texels(), big_endian, true));
+        let path = folder.write("grey.pfm", &pfm_bytes(8, 4, &texels(), big_endian, true));
         assert_eq!(load(&path).0.texels, grey);
     }
     let path = folder.path().join("grey.exr");
@@ -137,8 +129,8 @@ fn grey_files_give_grey_maps() {
 
 #[test]
 fn scale_and_rotation_are_applied() {
-    let folder = TempDir::new().unwrap();
-    let path = write(&folder, "map.hdr", &hdr_bytes(8, 4, &texels()));
+    let folder = Folder::new();
+    let path = folder.write("map.hdr", &hdr_bytes(8, 4, &texels()));
     let map = EnvironmentMap::load(&path, 2.5, -270.0, &mut Vec::new()).unwrap();
     assert_eq!(map.texels[3], texel(3) * 2.5);
     assert!((map.rotation_rad - std::f32::consts::FRAC_PI_2).abs() < 1e-6);
@@ -152,14 +144,14 @@ fn scale_and_rotation_are_applied() {
 
 #[test]
 fn texels_that_are_not_radiance_become_black_and_are_counted() {
-    let folder = TempDir::new().unwrap();
+    let folder = Folder::new();
     let mut broken = texels();
     broken[0].y = -0.5;
     broken[5].x = f32::NAN;
     broken[6].z = f32::INFINITY;
     broken[31] = Vec3::NEG_INFINITY;
     broken[30].x = 1e30;
-    let path = write(&folder, "broken.pfm", &pfm_bytes(8, 4, &broken, false, false));
+    let path = folder.write("broken.pfm", &pfm_bytes(8, 4, &broken, false, false));
     let (map, warnings) = load(&path);
     assert_eq!(warnings.len(), 1, "{warnings:?}");
     assert!(warnings[0].contains("5 of 32 texels"), "{warnings:?}");
@@ -171,8 +163,8 @@ fn texels_that_are_not_radiance_become_black_and_are_counted() {
 
 #[test]
 fn other_ratios_are_warned_of() {
-    let folder = TempDir::new().unwrap();
-    let path = write(&folder, "square.pfm", &pfm_bytes(4, 8, &texels(), false, false));
+    let folder = Folder::new();
+    let path = folder.write("square.pfm", &pfm_bytes(4, 8, &texels(), false, false));
     let (map, warnings) = load(&path);
     assert!(warnings.len() == 1 && warnings[0].contains("4×8"), "{warnings:?}");
     assert!((EnvironmentTables::new(&map).total).is_normal());
@@ -180,7 +172,7 @@ fn other_ratios_are_warned_of() {
 
 #[test]
 fn damaged_files_are_refused_with_a_reason() {
-    let folder = TempDir::new().unwrap();
+    let folder = Folder::new();
     let hdr = hdr_bytes(8, 4, &texels());
     let pfm = pfm_bytes(8, 4, &texels(), false, false);
     let exr_path = folder.path().join("whole.exr");
@@ -188,7 +180,7 @@ fn damaged_files_are_refused_with_a_reason() {
     let exr = fs::read(&exr_path).unwrap();
     for (name, whole) in [("cut.hdr", &hdr), ("cut.pfm", &pfm), ("cut.exr", &exr)] {
         for length in [0, 1, 7, whole.len() / 3, whole.len() / 2, whole.len() - 1] {
-            let path = write(&folder, name, &whole[..length]);
+            let path = folder.write(name, &whole[..length]);
             assert!(refusal(&path).len() > path.display().to_string().len() + 10);
         }
     }
@@ -211,7 +203,7 @@ fn damaged_files_are_refused_with_a_reason() {
         ("map.jpg", b"", "expected .hdr, .exr or .pfm"),
     ];
     for (name, bytes, expected) in cases {
-        let message = refusal(&write(&folder, name, bytes));
+        let message = refusal(&folder.write(name, bytes));
         assert!(message.contains(expected), "{message}");
     }
     let message = refusal(&folder.path().join("missing.hdr"));
@@ -224,9 +216,9 @@ fn damaged_files_are_refused_with_a_reason() {
 
 #[test]
 fn a_header_that_promises_more_than_the_file_holds_is_refused() {
-    let folder = TempDir::new().unwrap();
+    let folder = Folder::new();
     let header = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 16384\n";
-    let message = refusal(&write(&folder, "vast.hdr", header.as_bytes()));
+    let message = refusal(&folder.write("vast.hdr", header.as_bytes()));
     assert!(message.contains("its header promises 16384x8192 pixels"), "{message}");
     let path = folder.path().join("vast.exr");
     write_exr(&path, vec![("Y", FlatSamples::F32(vec![1.0; 32]))]);
@@ -235,17 +227,17 @@ fn a_header_that_promises_more_than_the_file_holds_is_refused() {
     let place = bytes.windows(window.len()).position(|found| found == window).unwrap();
     let corner = place + window.len() + 8;
     bytes[corner..corner + 8].copy_from_slice(&[16383_u32, 8191].map(u32::to_le_bytes).concat());
-    let message = refusal(&write(&folder, "vast.exr", &bytes));
+    let message = refusal(&folder.write("vast.exr", &bytes));
     assert!(message.contains("its header promises 16384x8192 pixels"), "{message}");
     // A flat map of the largest size is compressed most, and is still read.
     let flat = vec![Vec3::ONE; 8192 * 64];
-    let path = write(&folder, "flat.hdr", &hdr_bytes(8192, 64, &flat));
+    let path = folder.write("flat.hdr", &hdr_bytes(8192, 64, &flat));
     assert_eq!(load(&path).0.texels, flat);
 }
 
 #[test]
 fn a_file_with_flipped_bytes_never_panics() {
-    let folder = TempDir::new().unwrap();
+    let folder = Folder::new();
     let exr_path = folder.path().join("whole.exr");
     write_exr(&exr_path, vec![("Y", FlatSamples::F32(vec![1.0; 32]))]);
     let sources = [
@@ -257,7 +249,7 @@ fn a_file_with_flipped_bytes_never_panics() {
         for position in 0..bytes.len().min(400) {
             let mut damaged = bytes.clone();
             damaged[position] ^= 0xff;
-            let path = write(&folder, name, &damaged);
+            let path = folder.write(name, &damaged);
             // Either outcome is fine, but a map that loads must hold radiance.
             if let Ok(map) = EnvironmentMap::load(&path, 1.0, 0.0, &mut Vec::new()) {
                 assert!(map.texels.iter().all(|t| t.is_finite() && t.min_element() >= 0.0));

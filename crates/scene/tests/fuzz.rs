@@ -103,7 +103,7 @@ fn targets() -> Vec<Target> {
         Target {
             beside: beside(),
             mend: |bytes| seeds::mend_glb(bytes),
-            ..target("glb", "input.glb", vec![seeds::glb(&document)], scene)
+            ..target("glb", "input.glb", vec![seeds::glb(&document, &[])], scene)
         },
         Target { beside: beside(), ..target("pbrt", "input.pbrt", texts(&[seeds::PBRT]), scene) },
         Target { beside: beside(), ..target("xml", "input.xml", texts(&[seeds::XML]), scene) },

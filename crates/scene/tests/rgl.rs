@@ -18,6 +18,7 @@ use fenestra_scene::{
 use glam::{DVec3, dvec3};
 
 use crate::support::{
+    assert_contains,
     folder::Folder,
     tensor::{Field, brushed, direction, encode, floats, isotropic, measured},
 };
@@ -272,9 +273,7 @@ fn pbrt_scenes_keep_their_measurements() {
 fn bad_files_end_in_one_message() {
     let (_, fields) = isotropic(0.4);
     let bytes = encode(&fields);
-    let contains = |message: String, parts: &[&str]| {
-        parts.iter().for_each(|part| assert!(message.contains(part), "{part:?}: {message}"));
-    };
+    let contains = |message: String, parts: &[&str]| assert_contains(&message, parts);
     contains(message(b"Zemax"), &["expected a tensor file", "tensor_file"]);
     contains(message(b"tensor_file\0\x02\0\0\0\0\0"), &["version 1", "found 2.0"]);
     contains(message(b"tensor_file\0\x01\0\0\0\0\0"), &["`theta_i`", "found none"]);

@@ -137,16 +137,20 @@ pub const GLTF_MATERIALS: &str = r#"{"name": "oak", "alphaMode": "MASK", "alphaC
       "baseColorTexture": {"index": 0}, "metallicFactor": 0.2, "roughnessFactor": 0.6},
     "emissiveFactor": [0, 1, 0], "normalTexture": {"index": 0, "scale": 0.5}}"#;
 
-/// Puts a glTF document into a GLB container.
-pub fn glb(document: &str) -> Vec<u8> {
+/// Puts a glTF document into a GLB container, with its buffer unless that is empty.
+pub fn glb(document: &str, buffer: &[u8]) -> Vec<u8> {
     let mut json = document.as_bytes().to_vec();
     json.resize(json.len().next_multiple_of(4), b' ');
-    let mut bytes = b"glTF\x02\0\0\0".to_vec();
-    bytes.extend((json.len() as u32 + 20).to_le_bytes());
-    bytes.extend((json.len() as u32).to_le_bytes());
-    bytes.extend(b"JSON");
-    bytes.extend(json);
-    bytes
+    let mut chunks = Vec::new();
+    for (kind, chunk) in [(b"JSON", &json[..]), (b"BIN\0", buffer)] {
+        if !chunk.is_empty() {
+            chunks.extend((chunk.len() as u32).to_le_bytes());
+            chunks.extend(kind);
+            chunks.extend(chunk);
+        }
+    }
+    let length = (12 + chunks.len() as u32).to_le_bytes();
+    [b"glTF\x02\0\0\0", &length[..], &chunks].concat()
 }
 
 /// Corrects the lengths of a GLB container of one chunk.
