@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::Vec3;
 
-use super::{LoadOptions, Loader};
+use super::{FINITE, LoadOptions, Loader};
 use crate::{
     EnvironmentMap, Lamp, Portal,
     error::Result,
@@ -54,7 +54,7 @@ impl Loader<'_> {
     ) -> Result<EnvironmentMap> {
         let (scale, rotation_deg) = (entry.scale, entry.rotation_deg);
         self.check_range("environment.scale", &[scale], (0.0, f32::MAX))?;
-        self.check_range("environment.rotation_deg", &[rotation_deg], (f32::MIN, f32::MAX))?;
+        self.check_range("environment.rotation_deg", &[rotation_deg], FINITE)?;
         let named = |name: &str, map: Result<EnvironmentMap, String>| {
             map.map_err(|message| self.error(format!("environment.{name}: {message}")))
         };
@@ -68,8 +68,8 @@ impl Loader<'_> {
                 None => EnvironmentMap::load(&self.folder.join(map), scale, rotation_deg, warnings),
             },
             (None, Some(constant), None, None, None) => {
-                self.check_range("environment.constant", constant, (0.0, f32::MAX))?;
-                named("constant", EnvironmentMap::constant(Vec3::from_array(*constant), scale))
+                let radiance = self.vector("environment.constant", *constant, (0.0, f32::MAX))?;
+                named("constant", EnvironmentMap::constant(radiance, scale))
             }
             (None, None, Some(court), None, None) => {
                 named("court", EnvironmentMap::court(court, scale, rotation_deg))
@@ -105,14 +105,9 @@ impl Loader<'_> {
             Some(name) => format!("lamp `{name}` (line {})", entry.line),
             None => format!("lamp {index} (line {})", entry.line),
         };
-        let place = |position: [f32; 3]| {
-            self.check_range(&format!("{label}: position"), &position, (f32::MIN, f32::MAX))?;
-            Ok(Vec3::from_array(position))
-        };
-        let power = |key: &str, power: [f32; 3]| {
-            self.check_range(&format!("{label}: {key}"), &power, (0.0, f32::MAX))?;
-            Ok(Vec3::from_array(power))
-        };
+        let place = |position| self.vector(&format!("{label}: position"), position, FINITE);
+        let power =
+            |key: &str, power| self.vector(&format!("{label}: {key}"), power, (0.0, f32::MAX));
         let direction = |direction: [f32; 3]| {
             let unit = Vec3::from_array(direction).try_normalize();
             unit.ok_or_else(|| {

@@ -7,7 +7,7 @@ use std::{
 
 use glam::Vec3;
 
-use super::{Loader, MIN_ALPHA};
+use super::{FINITE, Loader, MIN_ALPHA};
 use crate::{
     error::Result,
     file::{
@@ -86,8 +86,7 @@ impl Loader<'_> {
                 format!("{label}: normal: a normal map has a strength, found factor")
             })?;
             let strength = entry.strength.unwrap_or(1.0);
-            let range = (f32::MIN, f32::MAX);
-            self.check_range(&format!("{label}: normal.strength"), &[strength], range)?;
+            self.check_range(&format!("{label}: normal.strength"), &[strength], FINITE)?;
             surface.normal =
                 Some(self.texture_use(label, "normal", entry, Encoding::Linear, loaded)?);
             surface.normal_scale = strength;
@@ -165,9 +164,8 @@ impl Loader<'_> {
                 let base_color = share("base_color", &entry.base_color, surface)?;
                 self.check_range(&format!("{label}: ior"), &[entry.ior], (1.0, 4.0))?;
                 self.check_range(&format!("{label}: specular"), &[entry.specular], (0.0, 1.0))?;
-                let specular_color = entry.specular_color;
-                let factor = (0.0, f32::MAX);
-                self.check_range(&format!("{label}: specular_color"), &specular_color, factor)?;
+                let (what, factor) = (format!("{label}: specular_color"), (0.0, f32::MAX));
+                let specular_color = self.vector(&what, entry.specular_color, factor)?;
                 let (metallic, texture) =
                     self.number(label, "metallic", &entry.metallic, (0.0, 1.0), loaded)?;
                 surface.metallic = texture;
@@ -180,13 +178,14 @@ impl Loader<'_> {
                     roughness,
                     ior: entry.ior,
                     specular: entry.specular,
-                    specular_color: Vec3::from_array(specular_color),
+                    specular_color,
                 })
             }
             MaterialKindEntry::Dielectric(entry) => {
-                let (ior, absorption) = (entry.ior, entry.absorption);
+                let ior = entry.ior;
                 self.check_range(&format!("{label}: ior"), &[ior], (0.2, 5.0))?;
-                self.check_range(&format!("{label}: absorption"), &absorption, (0.0, 1e6))?;
+                let what = format!("{label}: absorption");
+                let absorption = self.vector(&what, entry.absorption, (0.0, 1e6))?;
                 let is_smooth = entry.alpha.unwrap_or(0.0) == 0.0 && entry.roughness.is_none();
                 let alpha = if is_smooth {
                     0.0
@@ -204,7 +203,7 @@ impl Loader<'_> {
                     alpha,
                     reflectance: self.share(label, "reflectance", entry.reflectance)?,
                     transmittance: self.share(label, "transmittance", entry.transmittance)?,
-                    absorption: Vec3::from_array(absorption),
+                    absorption,
                 }
             }
             MaterialKindEntry::ThinDielectric(entry) => {
@@ -226,8 +225,7 @@ impl Loader<'_> {
 
     /// Reads three numbers 0…1.
     fn share(&self, label: &str, key: &str, share: [f32; 3]) -> Result<Vec3> {
-        self.check_range(&format!("{label}: {key}"), &share, (0.0, 1.0))?;
-        Ok(Vec3::from_array(share))
+        self.vector(&format!("{label}: {key}"), share, (0.0, 1.0))
     }
 
     /// Reads a colour or a texture of colours with its factor.
@@ -247,8 +245,7 @@ impl Loader<'_> {
             }
         };
         let factor = if texture.is_some() { ".factor" } else { "" };
-        self.check_range(&format!("{label}: {key}{factor}"), &color, range)?;
-        Ok((Vec3::from_array(color), texture))
+        Ok((self.vector(&format!("{label}: {key}{factor}"), color, range)?, texture))
     }
 
     /// Reads a number or a texture of numbers with its factor.
@@ -310,9 +307,9 @@ impl Loader<'_> {
     fn exact_fresnel(&self, label: &str, entry: &ConductorEntry) -> Result<ConductorFresnel> {
         match (&entry.reflectance, entry.eta, entry.k) {
             (None, Some(eta), Some(k)) => {
-                self.check_range(&format!("{label}: eta"), &eta, (0.01, 100.0))?;
-                self.check_range(&format!("{label}: k"), &k, (0.0, 100.0))?;
-                Ok(ConductorFresnel::Exact { eta: Vec3::from_array(eta), k: Vec3::from_array(k) })
+                let eta = self.vector(&format!("{label}: eta"), eta, (0.01, 100.0))?;
+                let k = self.vector(&format!("{label}: k"), k, (0.0, 100.0))?;
+                Ok(ConductorFresnel::Exact { eta, k })
             }
             _ => {
                 Err(self
@@ -337,8 +334,7 @@ impl Loader<'_> {
         let limit = (-1e6, 1e6);
         self.check_range(&format!("{label}: {key}.scale"), &entry.scale.0, limit)?;
         self.check_range(&format!("{label}: {key}.offset"), &entry.offset, limit)?;
-        let finite = (f32::MIN, f32::MAX);
-        self.check_range(&format!("{label}: {key}.rotate_deg"), &[entry.rotate_deg], finite)?;
+        self.check_range(&format!("{label}: {key}.rotate_deg"), &[entry.rotate_deg], FINITE)?;
         let path = self.folder.join(&entry.texture);
         let texture = loaded.textures.load(&path, &mut loaded.warnings)?;
         Ok(TextureUse {

@@ -174,6 +174,9 @@ fn viewed(camera: &CameraEntry, options: &LoadOptions) -> CameraEntry {
     viewed
 }
 
+/// Range of every finite number.
+const FINITE: (f32, f32) = (f32::MIN, f32::MAX);
+
 struct Loader<'a> {
     path: &'a Path,
     folder: &'a Path,
@@ -249,7 +252,7 @@ impl<'a> Loader<'a> {
             None => Ok(()),
             Some(found) => {
                 let expected = match (low, high) {
-                    (f32::MIN, f32::MAX) => "a finite number".to_owned(),
+                    FINITE => "a finite number".to_owned(),
                     (low, f32::MAX) => format!("a finite number of at least {low}"),
                     (low, high) => format!("a number from {low} to {high}"),
                 };
@@ -258,16 +261,18 @@ impl<'a> Loader<'a> {
         }
     }
 
+    /// Makes a vector of numbers that pass [`Self::check_range`].
+    fn vector(&self, what: &str, values: [f32; 3], range: (f32, f32)) -> Result<Vec3> {
+        self.check_range(what, &values, range)?;
+        Ok(Vec3::from_array(values))
+    }
+
     fn camera(&self, entry: &CameraEntry) -> Result<Camera> {
-        let finite = (f32::MIN, f32::MAX);
-        self.check_range("camera.position", &entry.position, finite)?;
-        self.check_range("camera.look_at", &entry.look_at, finite)?;
-        self.check_range("camera.up", &entry.up, finite)?;
+        let position = self.vector("camera.position", entry.position, FINITE)?;
+        let look_at = self.vector("camera.look_at", entry.look_at, FINITE)?;
+        let up = self.vector("camera.up", entry.up, FINITE)?;
         self.check_range("camera.vertical_fov_deg", &[entry.vertical_fov_deg], (0.01, 179.0))?;
         self.check_range("camera.aperture_radius", &[entry.aperture_radius], (0.0, f32::MAX))?;
-        let position = Vec3::from_array(entry.position);
-        let look_at = Vec3::from_array(entry.look_at);
-        let up = Vec3::from_array(entry.up);
         let view = look_at - position;
         let Some(view_direction) = view.try_normalize() else {
             return Err(self.error(format!(

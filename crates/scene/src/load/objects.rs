@@ -7,7 +7,7 @@ use std::{
 
 use glam::Vec3;
 
-use super::Loader;
+use super::{FINITE, Loader};
 use crate::{
     Geometry,
     error::{Error, Result},
@@ -192,10 +192,9 @@ impl Loader<'_> {
         rotate_deg: [f32; 3],
         translate: [f32; 3],
     ) -> Result<()> {
-        let finite = (f32::MIN, f32::MAX);
-        self.check_range(&format!("{label}: translate"), &translate, finite)?;
-        self.check_range(&format!("{label}: rotate_deg"), &rotate_deg, finite)?;
-        self.check_range(&format!("{label}: scale"), &scale, finite)?;
+        self.check_range(&format!("{label}: translate"), &translate, FINITE)?;
+        self.check_range(&format!("{label}: rotate_deg"), &rotate_deg, FINITE)?;
+        self.check_range(&format!("{label}: scale"), &scale, FINITE)?;
         self.check(!scale.contains(&0.0), || {
             format!("{label}: scale must not be 0, found {scale:?}")
         })

@@ -1,8 +1,6 @@
 //! `[[portal]]` → portals.
 
-use glam::Vec3;
-
-use super::Loader;
+use super::{FINITE, Loader};
 use crate::{
     error::Result,
     file::{Entry, PortalKeys},
@@ -33,10 +31,9 @@ impl Loader<'_> {
             Some(name) => format!("portal `{name}` (line {})", entry.line),
             None => format!("portal {index} (line {})", entry.line),
         };
-        self.check_range(&format!("{label}: corner"), &keys.corner, (-1e6, 1e6))?;
+        let corner = self.vector(&format!("{label}: corner"), keys.corner, (-1e6, 1e6))?;
         let edge = |key: &str, edge: [f32; 3]| {
-            self.check_range(&format!("{label}: {key}"), &edge, (f32::MIN, f32::MAX))?;
-            let edge = Vec3::from_array(edge);
+            let edge = self.vector(&format!("{label}: {key}"), edge, FINITE)?;
             let (low, high) = EDGES;
             self.check((low..=high).contains(&edge.length()), || {
                 format!(
@@ -59,7 +56,7 @@ impl Loader<'_> {
         let second = (second - cosine * first).normalize();
         Ok(Portal {
             name: keys.name.clone().unwrap_or_default(),
-            corner: Vec3::from_array(keys.corner),
+            corner,
             axes: [first, second],
             size: [width, height],
         })
