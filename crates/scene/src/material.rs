@@ -189,22 +189,20 @@ impl MaterialKind {
 
     /// The same with factors of its colour, its roughness and its share of metal.
     pub(crate) fn scaled(&self, color: Vec3, rough: f32, metal: f32) -> Self {
+        let tint = |own: &mut Vec3| *own = (*own * color).clamp(Vec3::ZERO, Vec3::ONE);
         let mut kind = self.clone();
         match &mut kind {
-            Self::Diffuse { reflectance } | Self::Mirror { reflectance } => {
-                *reflectance = (*reflectance * color).clamp(Vec3::ZERO, Vec3::ONE);
-            }
-            Self::Plastic { diffuse, .. } => {
-                *diffuse = (*diffuse * color).clamp(Vec3::ZERO, Vec3::ONE);
-            }
+            Self::Diffuse { reflectance: own }
+            | Self::Mirror { reflectance: own }
+            | Self::Plastic { diffuse: own, .. } => tint(own),
             Self::Conductor { alpha, fresnel } => {
                 *alpha = (*alpha * rough * rough).clamp(0.0, 1.0);
                 if let ConductorFresnel::Schlick { reflectance } = fresnel {
-                    *reflectance = (*reflectance * color).clamp(Vec3::ZERO, Vec3::ONE);
+                    tint(reflectance);
                 }
             }
             Self::Principled(own) => {
-                own.base_color = (own.base_color * color).clamp(Vec3::ZERO, Vec3::ONE);
+                tint(&mut own.base_color);
                 own.metallic = (own.metallic * metal).clamp(0.0, 1.0);
                 own.roughness = (own.roughness * rough).clamp(0.0, 1.0);
             }
