@@ -34,42 +34,9 @@ const LARGEST_GROWTH: usize = 4;
 const MOST_CRASHES: u32 = 40;
 
 /// Numbers at the limits of what files may say.
-const NUMBERS: [&str; 34] = [
-    "0",
-    "-0",
-    "1",
-    "-1",
-    "2",
-    "3",
-    "7",
-    "127",
-    "128",
-    "255",
-    "256",
-    "32768",
-    "65535",
-    "65536",
-    "1000000",
-    "16777216",
-    "16777217",
-    "2147483647",
-    "2147483648",
-    "4294967295",
-    "4294967296",
-    "-2147483648",
-    "9223372036854775807",
-    "18446744073709551615",
-    "1e9",
-    "1e20",
-    "1e38",
-    "1e39",
-    "-1e38",
-    "1e-38",
-    "1e-45",
-    "1e309",
-    "nan",
-    "inf",
-];
+const NUMBERS: &str = "0 -0 1 -1 2 3 7 127 128 255 256 32768 65535 65536 1000000 16777216 16777217 \
+    2147483647 2147483648 4294967295 4294967296 -2147483648 9223372036854775807 18446744073709551615 \
+    1e9 1e20 1e38 1e39 -1e38 1e-38 1e-45 1e309 nan inf";
 
 /// A parser under test.
 pub struct Target {
@@ -244,7 +211,8 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
             }
             let word = words[random.below(words.len())].clone();
             let new = if choice < 13 {
-                NUMBERS[random.below(NUMBERS.len())].as_bytes().to_vec()
+                let numbers: Vec<&str> = NUMBERS.split(' ').collect();
+                numbers[random.below(numbers.len())].into()
             } else if choice == 13 {
                 Vec::new()
             } else {
