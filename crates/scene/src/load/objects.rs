@@ -37,10 +37,12 @@ impl Loader<'_> {
         inputs: &mut Vec<PathBuf>,
         warnings: &mut Vec<String>,
     ) -> Result<Geometry> {
+        let labelled =
+            |(index, object)| (object, object_label(index, object), self.mesh_key(object));
+        let objects: Vec<_> = objects.iter().enumerate().map(labelled).collect();
         let mut named = HashMap::new();
-        let mut uses: HashMap<PathBuf, usize> = HashMap::new();
-        for (index, object) in objects.iter().enumerate() {
-            let label = object_label(index, object);
+        let mut uses: HashMap<&PathBuf, usize> = HashMap::new();
+        for (object, label, key) in &objects {
             if let Some(name) = &object.keys.name
                 && let Some(first) = named.insert(name, object.line)
             {
@@ -49,14 +51,14 @@ impl Loader<'_> {
                 );
             }
             let ObjectKeys { scale, rotate_deg, translate, .. } = &object.keys;
-            self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
-            self.check_material(&label, object, materials)?;
-            self.check_light_group(&label, object.keys.light_group.as_deref())?;
-            *uses.entry(self.mesh_key(object)).or_default() += 1;
+            self.check_transform(label, scale.0, *rotate_deg, *translate)?;
+            self.check_material(label, object, materials)?;
+            self.check_light_group(label, object.keys.light_group.as_deref())?;
+            *uses.entry(key).or_default() += 1;
         }
-        let keys = |is_asked: &dyn Fn(Option<&Material>) -> bool| -> HashSet<PathBuf> {
-            let asked = objects.iter().filter(|object| is_asked(named_material(object, materials)));
-            asked.map(|object| self.mesh_key(object)).collect()
+        let keys = |is_asked: &dyn Fn(Option<&Material>) -> bool| -> HashSet<&PathBuf> {
+            let asked = objects.iter().filter(|of| is_asked(named_material(of.0, materials)));
+            asked.map(|(_, _, key)| key).collect()
         };
         let own_materials = keys(&|named| named.is_none());
         // Shapes without textures need no texture coordinates, and their scenes keep their hashes.
@@ -66,16 +68,14 @@ impl Loader<'_> {
         // Read all meshes before placing any, so that the arrays are allocated once.
         let mut meshes = HashMap::new();
         let mut shape_triangles = 0;
-        for (index, object) in objects.iter().enumerate() {
-            let key = self.mesh_key(object);
-            if !meshes.contains_key(&key) {
+        for (object, label, key) in &objects {
+            if !meshes.contains_key(key) {
                 let mesh = match &object.source {
                     ObjectSource::Mesh(name) if self.arrays.meshes.contains_key(name) => {
-                        let label = object_label(index, object);
                         let mut mesh = self.arrays.meshes[name].clone();
                         mesh.check()
                             .map_err(|message| self.error(format!("{label}: {message}")))?;
-                        if !mesh.colors.is_empty() && !colored.contains(&key) {
+                        if !mesh.colors.is_empty() && !colored.contains(key) {
                             let remedy = "the material has no `vertex_color = true`";
                             warnings.push(format!("{label}: ignored the vertex colours: {remedy}"));
                             mesh.colors.clear();
@@ -83,90 +83,87 @@ impl Loader<'_> {
                         mesh
                     }
                     ObjectSource::Mesh(_) => {
-                        let mut mesh = Mesh::read_at(&key, self.time, None, None, warnings)?;
+                        let mut mesh = Mesh::read_at(key, self.time, None, None, warnings)?;
                         // The object of the scene is one, whatever parts its file has.
                         mesh.objects.clear();
                         inputs.push(key.clone());
                         inputs.extend_from_slice(&mesh.side_files);
-                        let mut ignored = ignored_in_object(&mesh, own_materials.contains(&key));
-                        let is_ply = crate::files::extension(&key) == "ply";
-                        if is_ply && !mesh.colors.is_empty() && !colored.contains(&key) {
+                        let mut ignored = ignored_in_object(&mesh, own_materials.contains(key));
+                        let is_ply = crate::files::extension(key) == "ply";
+                        if is_ply && !mesh.colors.is_empty() && !colored.contains(key) {
                             ignored.add(features::PLY_COLOR, || "element `vertex`".to_owned());
                             mesh.colors.clear();
                         }
-                        warnings.extend(ignored.warnings(&key));
+                        warnings.extend(ignored.warnings(key));
                         mesh
                     }
                     ObjectSource::Shape { shape, .. } => {
-                        stage::enter(format_args!("making {}", object_label(index, object)));
-                        let mut mesh = shape.mesh().map_err(|message| {
-                            self.error(format!("{}: {message}", object_label(index, object)))
-                        })?;
-                        if !textured.contains(&key) {
+                        stage::enter(format_args!("making {label}"));
+                        let mut mesh = shape
+                            .mesh()
+                            .map_err(|message| self.error(format!("{label}: {message}")))?;
+                        if !textured.contains(key) {
                             mesh.uvs = Default::default();
                         }
                         shape_triangles += mesh.triangles.len();
-                        self.check_shapes(index, object, shape_triangles)?;
+                        self.check_shapes(label, shape_triangles)?;
                         mesh
                     }
                 };
-                meshes.insert(key.clone(), mesh);
+                meshes.insert(key, mesh);
             }
         }
         let mut budget = Budget::default();
         let mut repeated = HashSet::new();
         let mut seen = HashSet::new();
-        for object in objects {
-            let key = self.mesh_key(object);
-            let copies = uses.get(&key).copied().unwrap_or(0);
+        for (_, _, key) in &objects {
+            let copies = uses.get(key).copied().unwrap_or(0);
             if copies > 1
-                && seen.insert(key.clone())
-                && budget.takes_instances(copies, meshes[&key].triangles.len())
+                && seen.insert(key)
+                && budget.takes_instances(copies, meshes[key].triangles.len())
             {
                 repeated.insert(key);
             }
         }
         let (mut vertices, mut triangles, mut shape_triangles) = (0_usize, 0_usize, 0);
-        for (index, object) in objects.iter().enumerate() {
-            let key = self.mesh_key(object);
-            if repeated.contains(&key) && !emits(object, &meshes[&key], materials) {
+        for (object, label, key) in &objects {
+            let mesh = &meshes[key];
+            if repeated.contains(key) && !emits(object, mesh, materials) {
                 continue;
             }
-            let count = meshes[&key].triangles.len();
-            vertices += meshes[&key].positions.len();
+            let count = mesh.triangles.len();
+            vertices += mesh.positions.len();
             triangles += count;
             if let ObjectSource::Shape { .. } = object.source {
                 shape_triangles += count;
-                self.check_shapes(index, object, shape_triangles)?;
+                self.check_shapes(label, shape_triangles)?;
             }
         }
         self.check_counts(vertices, triangles)?;
-        let mut prototypes: HashMap<PathBuf, Prototype> = HashMap::new();
+        let mut prototypes: HashMap<&PathBuf, Prototype> = HashMap::new();
         let mut geometry = Geometry::default();
         geometry.positions.reserve_exact(vertices);
         geometry.normals.reserve_exact(vertices);
         geometry.triangles.reserve_exact(triangles);
         geometry.materials.reserve_exact(triangles);
-        for (index, object) in objects.iter().enumerate() {
-            let key = self.mesh_key(object);
-            let mesh = &meshes[&key];
-            let label = object_label(index, object);
-            let is_instance = repeated.contains(&key) && !emits(object, mesh, materials);
-            if is_instance && !prototypes.contains_key(&key) {
+        for (object, label, key) in &objects {
+            let mesh = &meshes[key];
+            let is_instance = repeated.contains(key) && !emits(object, mesh, materials);
+            if is_instance && !prototypes.contains_key(key) {
                 let own = |triangle| run_material(mesh, triangle) as u32;
                 let (prototype, dropped) = geometry.add_prototype(mesh, own);
-                warnings.extend(dropped.warnings(&label, mesh.triangles.len()));
-                prototypes.insert(key.clone(), prototype);
+                warnings.extend(dropped.warnings(label, mesh.triangles.len()));
+                prototypes.insert(key, prototype);
             }
-            let prototype = prototypes.get(&key).copied().filter(|_| is_instance);
-            self.place(&label, object, mesh, prototype, &mut geometry, materials, warnings)?;
+            let prototype = prototypes.get(key).copied().filter(|_| is_instance);
+            self.place(label, object, mesh, prototype, &mut geometry, materials, warnings)?;
             // Drop a mesh after its last use, so that a large one is not held twice for long.
-            let left = uses.get_mut(&key).map_or(0, |left| {
+            let left = uses.get_mut(key).map_or(0, |left| {
                 *left -= 1;
                 *left
             });
             if left == 0 {
-                meshes.remove(&key);
+                meshes.remove(key);
             }
         }
         Ok(geometry)
@@ -180,9 +177,8 @@ impl Loader<'_> {
         }
     }
 
-    fn check_shapes(&self, index: usize, object: &ObjectEntry, triangles: usize) -> Result<()> {
-        let label = || object_label(index, object);
-        check_triangles(triangles).map_err(|message| self.error(format!("{}: {message}", label())))
+    fn check_shapes(&self, label: &str, triangles: usize) -> Result<()> {
+        check_triangles(triangles).map_err(|message| self.error(format!("{label}: {message}")))
     }
 
     pub(super) fn check_transform(
