@@ -13,7 +13,6 @@ use crate::{
     error::Result,
     features,
     file::{Entry, IncludeKeys},
-    import::Imported,
     instance::{Budget, Instance},
     lamp::{LampKind, Spot},
     material::{Material, MaterialKind},
@@ -38,7 +37,7 @@ impl Loader<'_> {
         self.check_light_group(&label, light_group.as_deref())?;
         self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
         let path = self.folder.join(file);
-        let Contents { materials: own_materials, geometry: mut placed, mut lamps } =
+        let (own_materials, mut placed, mut lamps) =
             self.contents(&label, &path, replaced, inputs, warnings)?;
         for name in replaced.keys() {
             let is_there = own_materials.iter().any(|material| material.name == *name);
@@ -88,13 +87,10 @@ impl Loader<'_> {
         self.check_counts(vertices, triangles)?;
         let first_vertex = geometry.positions.len();
         let count = placed.triangle_count() as usize;
-        let emits: Vec<bool> =
-            materials.iter().map(|material| material.surface.emission.is_some()).collect();
-        let moved = Moved { transform: &transform, places: &places, emits: &emits };
         for start in &mut placed.objects {
             start.name = format!("{stem}/{}", start.name);
         }
-        self.include_instances(&label, geometry, &mut placed, &moved)?;
+        self.include_instances(&label, geometry, &mut placed, &transform, &places, materials)?;
         let mesh = Mesh {
             positions: placed.positions,
             normals: placed.normals,
@@ -115,18 +111,17 @@ impl Loader<'_> {
         }
         Ok(lamps.into_iter().map(|lamp| place_lamp(lamp, &transform)).collect())
     }
-}
 
-impl Loader<'_> {
-    /// Takes over the instances of an included file.
+    /// Takes over the instances of an included file, whose materials have `places` among those of the scene.
     fn include_instances(
         &self,
         label: &str,
         geometry: &mut Geometry,
         placed: &mut Geometry,
-        moved: &Moved<'_>,
+        transform: &Transform,
+        places: &[u32],
+        materials: &[Material],
     ) -> Result<()> {
-        let Moved { transform, places, emits } = *moved;
         let first_prototype = geometry.prototypes.len() as u32;
         geometry.prototypes.append(&mut placed.prototypes);
         let boxes = geometry.prototypes();
@@ -143,7 +138,7 @@ impl Loader<'_> {
                 self.error(format!("{label}: expected a placement of instances with an inverse"))
             })?;
             self.check_extent(label, boxes[prototype as usize].corners(&moved))?;
-            if emits[first_material as usize] {
+            if materials[first_material as usize].surface.emission.is_some() {
                 // A material of the scene may emit in place of one of the file that does not.
                 let mesh = std::mem::take(&mut geometry.prototypes[prototype as usize]);
                 let vertices = geometry.positions.len() + mesh.positions.len();
@@ -160,26 +155,8 @@ impl Loader<'_> {
         }
         Ok(())
     }
-}
 
-/// An included file in the scene.
-struct Moved<'a> {
-    transform: &'a Transform,
-    /// Its materials among those of the scene.
-    places: &'a [u32],
-    /// Materials of the scene that emit light.
-    emits: &'a [bool],
-}
-
-/// Materials, triangles and lamps of an included file.
-struct Contents {
-    materials: Vec<Material>,
-    geometry: Geometry,
-    lamps: Vec<Lamp>,
-}
-
-impl Loader<'_> {
-    /// Reads a file to be included: the same as of a whole scene.
+    /// Reads materials, triangles and lamps of a file to be included: the same as of a whole scene.
     fn contents(
         &self,
         label: &str,
@@ -187,7 +164,7 @@ impl Loader<'_> {
         replaced: &BTreeMap<String, String>,
         inputs: &mut Vec<PathBuf>,
         warnings: &mut Vec<String>,
-    ) -> Result<Contents> {
+    ) -> Result<(Vec<Material>, Geometry, Vec<Lamp>)> {
         if !whole::is_whole(path) {
             let imported = self.beside(path).import(None)?.ok_or_else(|| {
                 self.error(format!(
@@ -200,8 +177,7 @@ impl Loader<'_> {
             if imported.environment.is_some_and(|environment| !environment.is_black()) {
                 warnings.push(format!("{label}: ignored the environment of the file"));
             }
-            let Imported { materials, geometry, lamps, .. } = imported;
-            return Ok(Contents { materials, geometry, lamps });
+            return Ok((imported.materials, imported.geometry, imported.lamps));
         }
         let mut mesh = Mesh::read_at(path, self.time, None, Some(Budget::default()), warnings)?;
         inputs.push(path.to_path_buf());
@@ -213,7 +189,7 @@ impl Loader<'_> {
         let lamps = std::mem::take(&mut mesh.lamps);
         let (materials, geometry) = self.beside(path).place_whole(&mesh, &mut ignored, warnings)?;
         warnings.extend(ignored.warnings(path));
-        Ok(Contents { materials, geometry, lamps })
+        Ok((materials, geometry, lamps))
     }
 }
 

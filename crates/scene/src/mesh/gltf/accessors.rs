@@ -14,13 +14,6 @@ use crate::{
 /// Most elements of a sparse accessor that starts from zeros, which no buffer bounds.
 const MAX_ZEROS: usize = 1 << 26;
 
-/// Elements of one size in a buffer view.
-struct Elements {
-    offset: usize,
-    count: usize,
-    size: usize,
-}
-
 impl<'a> GltfReader<'a> {
     /// Reads vectors of `N` numbers: floats, or integers as `KHR_mesh_quantization` has them.
     pub(super) fn vectors<const N: usize>(&self, accessor: &Accessor) -> Result<Vec<[f32; N]>> {
@@ -118,12 +111,10 @@ impl<'a> GltfReader<'a> {
             size_of::<T>(),
         )
         .map_err(Error::memory)?;
-        let range = |offset, count, size| Elements { offset, count, size };
         let mut elements: Vec<T> = match accessor.view() {
-            Some(view) => self
-                .slices(&label, &view, &range(accessor.offset(), count, size))?
-                .map(&element)
-                .collect(),
+            Some(view) => {
+                self.slices(&label, &view, accessor.offset(), count, size)?.map(&element).collect()
+            }
             None if accessor.sparse().is_some() && count <= MAX_ZEROS => {
                 (0..count).map(|_| element(&vec![0; size])).collect()
             }
@@ -136,10 +127,10 @@ impl<'a> GltfReader<'a> {
                 IndexType::U16 => 2,
                 IndexType::U32 => 4,
             };
-            let places = range(indices.offset(), sparse.count(), index_size);
-            let new = range(values.offset(), sparse.count(), size);
-            let places = self.slices(&label, &indices.view(), &places)?;
-            for (place, value) in places.zip(self.slices(&label, &values.view(), &new)?) {
+            let (from, count) = (indices.offset(), sparse.count());
+            let places = self.slices(&label, &indices.view(), from, count, index_size)?;
+            let new = self.slices(&label, &values.view(), values.offset(), count, size)?;
+            for (place, value) in places.zip(new) {
                 let place = place.iter().rev().fold(0, |sum, &byte| sum << 8 | usize::from(byte));
                 *elements.get_mut(place).ok_or_else(|| {
                     self.error(format!("{label}: sparse index {place} is out of range"))
@@ -149,12 +140,14 @@ impl<'a> GltfReader<'a> {
         Ok(elements)
     }
 
-    /// Cuts a buffer view into elements; `label` names its user.
+    /// Cuts a buffer view into `count` elements of `size` bytes from an offset on; `label` names its user.
     fn slices<'s>(
         &'s self,
         label: &str,
         view: &View,
-        &Elements { offset, count, size }: &Elements,
+        offset: usize,
+        count: usize,
+        size: usize,
     ) -> Result<impl Iterator<Item = &'s [u8]> + use<'s, 'a>> {
         let stride = view.stride().unwrap_or(size);
         let needed = count

@@ -6,10 +6,7 @@ use gltf::{
     mesh::{Mode, Semantic},
 };
 
-use super::{
-    GltfReader,
-    skin::{Place, Posed},
-};
+use super::{GltfReader, skin::Place};
 use crate::{
     error::Result,
     features,
@@ -98,12 +95,9 @@ impl GltfReader<'_> {
         let (world_from_node, mirrors) = match place {
             Place::Node(matrix) => (matrix, Mat3::from_mat4(matrix).determinant() < 0.0),
             Place::Joints(joints) => {
-                let posed = Posed {
-                    positions: &mut positions,
-                    normals: normals.as_deref_mut(),
-                    tangents: tangents.as_deref_mut(),
-                };
-                (Mat4::IDENTITY, self.pose(primitive, joints, posed)?)
+                let (normals, tangents) = (normals.as_mut(), tangents.as_mut());
+                let mirrors = self.pose(primitive, joints, &mut positions, normals, tangents)?;
+                (Mat4::IDENTITY, mirrors)
             }
         };
         let linear = Mat3::from_mat4(world_from_node);

@@ -18,13 +18,6 @@ pub(super) enum Place<'j> {
     Joints(&'j [Mat4]),
 }
 
-/// Attributes of a primitive that joints move.
-pub(super) struct Posed<'p> {
-    pub positions: &'p mut [[f32; 3]],
-    pub normals: Option<&'p mut [[f32; 3]]>,
-    pub tangents: Option<&'p mut [[f32; 4]]>,
-}
-
 impl GltfReader<'_> {
     /// Adds the mesh of a node with a skin; `worlds` places the nodes of the scene. The node itself does not
     /// place the mesh.
@@ -78,9 +71,11 @@ impl GltfReader<'_> {
         &self,
         primitive: &Primitive,
         joints: &[Mat4],
-        posed: Posed<'_>,
+        positions: &mut [[f32; 3]],
+        normals: Option<&mut Vec<[f32; 3]>>,
+        tangents: Option<&mut Vec<[f32; 4]>>,
     ) -> Result<bool> {
-        let count = posed.positions.len();
+        let count = positions.len();
         let mut matrices = vec![(Mat4::ZERO, 0.0); count];
         for set in 0.. {
             let names = self.attribute::<4>(primitive, &Semantic::Joints(set), count)?;
@@ -108,14 +103,14 @@ impl GltfReader<'_> {
             if total == 0.0 { Mat4::IDENTITY } else { sum * total.recip() }
         };
         let matrices: Vec<Mat4> = matrices.into_iter().map(of).collect();
-        for (position, matrix) in posed.positions.iter_mut().zip(&matrices) {
+        for (position, matrix) in positions.iter_mut().zip(&matrices) {
             *position = matrix.transform_point3((*position).into()).into();
         }
-        for (normal, matrix) in posed.normals.into_iter().flatten().zip(&matrices) {
+        for (normal, matrix) in normals.into_iter().flatten().zip(&matrices) {
             let turn = Mat3::from_mat4(*matrix).inverse().transpose();
             *normal = (turn * Vec3::from(*normal)).into();
         }
-        for (tangent, matrix) in posed.tangents.into_iter().flatten().zip(&matrices) {
+        for (tangent, matrix) in tangents.into_iter().flatten().zip(&matrices) {
             let [x, y, z, sign] = *tangent;
             *tangent = matrix.transform_vector3(Vec3::new(x, y, z)).extend(sign).into();
         }

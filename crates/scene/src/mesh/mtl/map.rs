@@ -41,15 +41,9 @@ impl Default for Options {
     }
 }
 
-/// Statement whose name has not been looked up.
-pub(super) struct Statement<'a> {
-    pub(super) name: &'a str,
-    pub(super) options: Options,
-}
-
-/// Splits the text after the key into options and the name, which may hold spaces; also returns the
-/// options that change nothing here.
-pub(super) fn parse(text: &str) -> (Statement<'_>, Vec<&str>) {
+/// Splits the text after the key into options and the name, which may hold spaces; returns the name, the
+/// options, and those that change nothing here.
+pub(super) fn parse(text: &str) -> (&str, Options, Vec<&str>) {
     let mut options = Options::default();
     let mut unknown = Vec::new();
     let mut rest = text.trim();
@@ -116,7 +110,7 @@ pub(super) fn parse(text: &str) -> (Statement<'_>, Vec<&str>) {
         }
         rest = tail;
     }
-    (Statement { name: rest, options }, unknown)
+    (rest, options, unknown)
 }
 
 impl Map {
@@ -159,10 +153,10 @@ mod tests {
 
     #[test]
     fn options_stand_before_a_name_with_spaces() {
-        let (statement, unknown) = parse(
+        let (name, options, unknown) = parse(
             "-s 2 3 1 -o 0.5 -clamp on -bm 0.3 -blendu off -mm 0.1 0.8 -imfchan g my oak.png",
         );
-        assert_eq!((statement.name, unknown), ("my oak.png", vec!["-blendu"]));
+        assert_eq!((name, unknown), ("my oak.png", vec!["-blendu"]));
         let expected = Options {
             scale: [2.0, 3.0],
             offset: [0.5, 0.0],
@@ -171,10 +165,9 @@ mod tests {
             channels: Some(Channels::Green),
             strength: 0.3,
         };
-        assert_eq!(statement.options, expected);
+        assert_eq!(options, expected);
         for text in ["oak.png", "-oak.png", "2.png", "-s 2 2.png", ""] {
-            let name = parse(text).0.name;
-            assert_eq!(name, text.strip_prefix("-s 2 ").unwrap_or(text));
+            assert_eq!(parse(text).0, text.strip_prefix("-s 2 ").unwrap_or(text));
         }
     }
 }

@@ -96,16 +96,16 @@ impl<'a> Library<'a> {
         };
         let color = color.filter(|color| color.is_finite() && color.min_element() >= 0.0);
         let map = |entry: &mut LibraryMaterial| -> Option<Map> {
-            let (map, unknown) = map::parse(rest);
+            let (name, options, unknown) = map::parse(rest);
             for option in unknown {
                 entry.ignore(features::MTL_OPTION, &format!("option `{option}`"));
             }
             let place = entry.place.clone();
-            let Ok(path) = folder.file_within(within, map.name) else {
-                entry.ignore(features::MTL_OUTSIDE, &format!("image `{}`", map.name));
+            let Ok(path) = folder.file_within(within, name) else {
+                entry.ignore(features::MTL_OUTSIDE, &format!("image `{name}`"));
                 return None;
             };
-            Some(Map { path, place, options: map.options })
+            Some(Map { path, place, options })
         };
         match key.to_ascii_lowercase().as_str() {
             "kd" => {
