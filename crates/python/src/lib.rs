@@ -99,9 +99,8 @@ impl Scene {
             ..Mesh::default()
         };
         let meshes = meshes.iter().map(|(name, arrays)| (name.clone(), mesh(arrays))).collect();
-        let images = images.iter().map(|(name, (width, height, bytes))| {
-            let (width, height) = (*width, *height);
-            (name.clone(), RgbImage { width, height, pixels: pod_collect_to_vec(bytes) })
+        let images = images.into_iter().map(|(name, (width, height, bytes))| {
+            (name, RgbImage { width, height, pixels: pod_collect_to_vec(&bytes) })
         });
         let arrays = Arrays { meshes, images: images.collect() };
         apart(py, || {

@@ -7,9 +7,7 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
 };
 use fenestra_scene::{
-    environment::{
-        CourtParameters, DaylightParameters, EnvironmentMap, EnvironmentTables, SkyParameters,
-    },
+    environment::{CourtParameters, EnvironmentMap, EnvironmentTables, SkyParameters},
     math::{colour::luminance, frame::direction_from_lat_long},
 };
 use glam::{Vec2, Vec3};
@@ -348,18 +346,13 @@ fn procedural_maps_are_lit_as_their_names_say() {
 
 #[test]
 fn parameters_out_of_range_are_refused_by_name() {
-    let sky = |text: &str| {
-        let parameters: SkyParameters = toml::from_str(text).map_err(|e| e.to_string())?;
-        EnvironmentMap::sky(&parameters, 1.0, 0.0).map(|_| ())
-    };
-    let court = |text: &str| {
-        let parameters: CourtParameters = toml::from_str(text).map_err(|e| e.to_string())?;
-        EnvironmentMap::court(&parameters, 1.0, 0.0).map(|_| ())
-    };
-    let daylight = |text: &str| {
-        let parameters: DaylightParameters = toml::from_str(text).map_err(|e| e.to_string())?;
-        EnvironmentMap::daylight(&parameters, 1.0, 0.0).map(|_| ())
-    };
+    type Made = Result<EnvironmentMap, String>;
+    fn made<P: serde::de::DeserializeOwned>(text: &str, make: fn(&P, f32, f32) -> Made) -> Made {
+        make(&toml::from_str(text).map_err(|error| error.to_string())?, 1.0, 0.0)
+    }
+    let sky = |text| made(text, EnvironmentMap::sky);
+    let court = |text| made(text, EnvironmentMap::court);
+    let daylight = |text| made(text, EnvironmentMap::daylight);
     sky("width = 64\nsun_radius_deg = 5").unwrap();
     court("width = 64\nstoreys = 20\nglint_share = 1").unwrap();
     let cases = [

@@ -954,10 +954,9 @@ fn binary_ply(big_endian: bool) -> Vec<u8> {
         "ply\nformat {name} 1.0\ncomment made by a test\nelement vertex 4\nproperty double x\n\
          property uchar quality\nproperty float y\nproperty float z\nproperty float nx\n\
          property float ny\nproperty float nz\nelement edge 1\nproperty list ushort short ends\n\
-         property int64_like_comment x\nelement face 2\nproperty uchar flags\n\
+         element face 2\nproperty uchar flags\n\
          property list uint ushort vertex_index\nend_header\n"
     )
-    .replace("property int64_like_comment x\n", "")
     .into_bytes();
     let mut push = |little: &[u8]| {
         let reversed = little.iter().rev().copied();

@@ -1,7 +1,7 @@
 //! Small sound files of every format that the program reads, for mutations to begin from.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-use std::{fs, io::Cursor, path::Path};
+use std::{fs, io::Cursor};
 
 use fenestra_scene::picture::Image;
 use flate2::{Compression, write::ZlibEncoder};
@@ -281,21 +281,13 @@ pub fn picture(format: ImageFormat, has_alpha: bool) -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// The bytes of a file that `write` makes.
-fn written(name: &str, write: impl FnOnce(&Path)) -> Vec<u8> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(name);
-    write(&path);
-    fs::read(path).unwrap()
-}
-
 /// An OpenEXR image of 8×4 pixels.
 pub fn exr(is_compressed: bool) -> Vec<u8> {
-    let mut image = Image::new(8, 4);
     let values: Vec<_> = (0..32_u8).map(|index| [f32::from(index), 1.0, 0.5]).collect();
-    image.insert_triple(["R", "G", "B"], &values);
-    written("a.exr", |path| {
-        if is_compressed { image.write_exr(path) } else { image.write_exr_uncompressed(path) }
-            .unwrap();
-    })
+    let image = Image::of_rgb(8, 4, &values);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    if is_compressed { image.write_exr(&path) } else { image.write_exr_uncompressed(&path) }
+        .unwrap();
+    fs::read(path).unwrap()
 }
