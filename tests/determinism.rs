@@ -12,7 +12,7 @@ use fenestra::{
 };
 use glam::Vec3;
 
-use crate::support::{self, command::Folder, renderer, scenes};
+use crate::support::{self, assert_error, command::Folder, renderer, scenes};
 
 /// A room on a film whose pixels share samples.
 fn scene() -> Scene {
@@ -350,8 +350,7 @@ fn sums_of_another_window_are_refused() {
     let mut sums = render(settings(Sampler::Mis), &[1]);
     sums.origin = [1, 0];
     let mut renderer = renderer(&scene(), settings(Sampler::Mis));
-    let error = renderer.restore(&sums).unwrap_err().to_string();
-    assert!(error.contains("[1, 0]"), "{error}");
+    assert_error(renderer.restore(&sums), &["[1, 0]"]);
 }
 
 #[test]

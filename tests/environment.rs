@@ -20,7 +20,7 @@ use fenestra::{
 use glam::{Vec2, Vec3};
 
 use crate::{
-    support::{self, scenes, statistics::chi_square_p_value},
+    support::{self, assert_error, scenes, statistics::chi_square_p_value},
     twin::{environment::EnvironmentSampling as _, random::random_2d},
 };
 
@@ -478,6 +478,8 @@ fn the_shader_agrees() {
 fn a_map_beyond_the_device_is_refused_before_the_work() {
     let mut scene = scenes::mixed_room();
     (scene.environment.width, scene.environment.height) = (1 << 20, 1 << 19);
-    let error = Renderer::new(support::device(), &scene, Settings::default()).err().unwrap();
-    assert!(error.to_string().contains("1048576x524288 texels takes"), "{error}");
+    assert_error(
+        Renderer::new(support::device(), &scene, Settings::default()),
+        &["1048576x524288 texels takes"],
+    );
 }

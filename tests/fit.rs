@@ -21,7 +21,10 @@ use fenestra::{
 };
 use glam::{Vec2, Vec3};
 
-use crate::twin::srbf::{Mixture, lobe_integral};
+use crate::{
+    support::assert_error,
+    twin::srbf::{Mixture, lobe_integral},
+};
 
 /// Tabulates a function of the direction as a map.
 fn map(width: u32, function: impl Fn(Vec3) -> Vec3) -> EnvironmentMap {
@@ -204,8 +207,7 @@ fn files_hold_what_was_fitted() {
         let mut damaged = bytes.clone();
         damaged[position] ^= 1;
         fs::write(&path, &damaged).unwrap();
-        let error = read_fit(&path).unwrap_err().to_string();
-        assert!(error.contains("map.fit"), "{error}");
+        assert_error(read_fit(&path), &["map.fit"]);
         fs::write(&path, &bytes[..position]).unwrap();
         assert!(read_fit(&path).is_err());
     }
@@ -302,15 +304,14 @@ fn hopeless_maps_are_refused_and_odd_ones_fitted() {
     let options = |lobes| EnvironmentOptions { lobes, method: Method::Em };
     let fit =
         |map: &EnvironmentMap, lobes| environment_lobes(map, options(lobes), None, &mut |_| ());
-    let message = |map: &EnvironmentMap, lobes| fit(map, lobes).unwrap_err().to_string();
     let constant = map(64, |_| Vec3::splat(2.0));
-    assert!(message(&map(64, |_| Vec3::ZERO), 10).contains("black"));
-    assert!(message(&constant, 0).contains("0 lobes asked for; expected 1 to 4096"));
-    assert!(message(&constant, 100_000).contains("100000 lobes"));
+    assert_error(fit(&map(64, |_| Vec3::ZERO), 10), &["black"]);
+    assert_error(fit(&constant, 0), &["0 lobes asked for; expected 1 to 4096"]);
+    assert_error(fit(&constant, 100_000), &["100000 lobes"]);
     for wrong in [f32::NAN, f32::INFINITY, -1.0] {
         let mut damaged = constant.clone();
         damaged.texels[70].y = wrong;
-        assert!(message(&damaged, 10).contains("texel (6, 1)"));
+        assert_error(fit(&damaged, 10), &["texel (6, 1)"]);
     }
 
     for lobes in [1, 7, 100] {
@@ -397,8 +398,7 @@ fn narrow_highlights_move_with_the_view() {
 fn hopeless_materials_are_refused() {
     let black = material(MaterialKind::Diffuse { reflectance: Vec3::ZERO });
     let options = BrdfOptions { lobes: 8, views: 4, method: Method::Em };
-    let error = brdf_lobes(&black, 0, "black", options, None, &mut |_| ()).unwrap_err();
-    assert!(error.to_string().contains("reflects nothing"), "{error}");
+    assert_error(brdf_lobes(&black, 0, "black", options, None, &mut |_| ()), &["reflects nothing"]);
     // No light is sampled at glass and mirrors, and nothing there is to be fitted.
     let white = Vec3::ONE;
     for kind in [
@@ -406,9 +406,10 @@ fn hopeless_materials_are_refused() {
         MaterialKind::glass(1.5, 0.2),
         MaterialKind::ThinDielectric { ior: 1.5, reflectance: white, transmittance: white },
     ] {
-        let error =
-            brdf_lobes(&material(kind), 0, "glass", options, None, &mut |_| ()).unwrap_err();
-        assert!(error.to_string().contains("a mirror or glass"), "{error}");
+        assert_error(
+            brdf_lobes(&material(kind), 0, "glass", options, None, &mut |_| ()),
+            &["a mirror or glass"],
+        );
     }
     let grey = material(MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) });
     for (lobes, views) in [(0, 4), (100_000, 4), (8, 0), (8, 100_000)] {

@@ -21,7 +21,7 @@ use fenestra::{
 };
 use glam::Vec3;
 
-use crate::support::{self, guide::Guide as _, render, renderer, scenes};
+use crate::support::{self, assert_error, guide::Guide as _, render, renderer, scenes};
 
 /// Returns settings of `visibility` with few lobes, `assignments` and the layer of its caches.
 fn visibility(assignments: &[&str]) -> Settings {
@@ -257,8 +257,7 @@ fn layers_of_other_samplers_are_refused() {
         (Aov::GuideCell, Sampler::Mis, "--aov guide-cell: the sampler mis"),
     ] {
         let settings = Settings { sampler, aovs: vec![aov], ..Settings::default() };
-        let error = Renderer::new(support::device(), &scene, settings).err().unwrap().to_string();
-        assert!(error.contains(expected), "{error}");
+        assert_error(Renderer::new(support::device(), &scene, settings), &[expected]);
     }
 }
 

@@ -10,7 +10,7 @@ use fenestra::{
 use glam::Vec3;
 
 use crate::support::{
-    self,
+    self, assert_error,
     replicates::{BLOCK, LIMIT, REPLICATES, block_means, rows},
     scenes,
     statistics::{Comparison, estimates},
@@ -155,18 +155,15 @@ fn many_lamps_keep_their_groups() {
 fn what_cannot_be_kept_apart_is_refused() {
     let _alone = support::alone();
     let mut scene = room();
-    let error = |scene: &Scene, settings: Settings| {
-        Renderer::new(support::device(), scene, settings).err().unwrap().to_string()
-    };
+    let new = |scene: &Scene, settings| Renderer::new(support::device(), scene, settings);
     let mut shared = settings(Sampler::Guided, 2);
     shared.parameters.set("share-paths=4").unwrap();
-    let message = error(&scene, shared);
-    assert!(message.contains("expected --set share-paths=off"), "{message}");
+    assert_error(new(&scene, shared), &["expected --set share-paths=off"]);
     for index in 0..6 {
         let mut lamp = scene.lamps[0].clone();
         lamp.light_group = Some(format!("lamp {index}"));
         scene.lamps.push(lamp);
     }
-    let message = error(&scene, settings(Sampler::Mis, 1));
-    assert!(message.contains("at most 8 groups, found 9: environment, key, lamp 0"), "{message}");
+    let refused = new(&scene, settings(Sampler::Mis, 1));
+    assert_error(refused, &["at most 8 groups, found 9: environment, key, lamp 0"]);
 }

@@ -120,6 +120,15 @@ pub fn assert_silent() {
     assert!(messages.is_empty(), "validation messages:\n{}", messages.join("\n"));
 }
 
+/// Fails unless `result` is an error whose message has all `parts`.
+#[track_caller]
+pub fn assert_error<T>(result: Result<T, impl ToString>, parts: &[&str]) {
+    let message = result.err().expect("an error").to_string();
+    for part in parts {
+        assert!(message.contains(part), "expected {part:?} in: {message}");
+    }
+}
+
 /// Runs a probe shader over `invocations` invocations and returns its output.
 pub fn run_probe(
     spirv: &[u8],
