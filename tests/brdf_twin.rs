@@ -1,10 +1,7 @@
 //! `glsl/include/brdf.glsl` against its Rust twin, over all kinds of materials.
 
 use bytemuck::{Pod, Zeroable};
-use fenestra::shader::{
-    bindings::{probe, scene},
-    constants::MATERIAL_MEASURED,
-};
+use fenestra::shader::{bindings::scene, constants::MATERIAL_MEASURED};
 use glam::Vec3;
 
 use crate::{
@@ -61,18 +58,16 @@ fn difference(found: Vec3, expected: Vec3, absolute: f32) -> f32 {
 #[test]
 fn shader_agrees_with_its_twin() {
     let queries: Vec<BrdfQuery> = (0..20_000).map(query).collect();
-    let bytes = support::run_probe(
+    let answers: Vec<BrdfAnswer> = support::run_probe(
         include_bytes!(concat!(env!("OUT_DIR"), "/test/brdf.spv")),
+        &[],
         &[
-            (probe::PROBE_INPUT, bytemuck::cast_slice(&queries)),
             (scene::MATERIALS, bytemuck::cast_slice(&tables().materials)),
             (scene::BRDF_TABLE, bytemuck::cast_slice(&tables().words)),
             (scene::BRDF_CELLS, bytemuck::cast_slice(&tables().words)),
         ],
-        size_of::<BrdfAnswer>() * queries.len(),
-        queries.len() as u32,
+        &queries,
     );
-    let answers: Vec<BrdfAnswer> = bytemuck::pod_collect_to_vec(&bytes);
 
     // In rare cases, rounding moves a direction into the next bin of a sampling table, where the
     // density is another.
@@ -144,16 +139,12 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
         SpecularQuery { outgoing_local, u, material, is_back: index / 3 % 2, distance }
     };
     let queries: Vec<SpecularQuery> = (0..20_000).map(query).collect();
-    let bytes = support::run_probe(
+    let answers: Vec<SpecularAnswer> = support::run_probe(
         include_bytes!(concat!(env!("OUT_DIR"), "/test/specular.spv")),
-        &[
-            (probe::PROBE_INPUT, bytemuck::cast_slice(&queries)),
-            (scene::MATERIALS, bytemuck::cast_slice(specular())),
-        ],
-        size_of::<SpecularAnswer>() * queries.len(),
-        queries.len() as u32,
+        &[],
+        &[(scene::MATERIALS, bytemuck::cast_slice(specular()))],
+        &queries,
     );
-    let answers: Vec<SpecularAnswer> = bytemuck::pod_collect_to_vec(&bytes);
 
     // In rare cases, rounding moves a number across the probability of reflection, or a direction
     // across the horizon.

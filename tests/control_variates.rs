@@ -15,7 +15,7 @@ use fenestra::{
     scene::Scene,
     session::Settings,
     shader::{
-        bindings::{probe, scene},
+        bindings::scene,
         rooms::control_variates::{
             CONSTANT_CONTROL_BITS, CONSTANT_CONTROL_CHOICE, CONSTANT_CONTROL_SHARE,
         },
@@ -98,19 +98,14 @@ fn the_shader_agrees() {
             (CONSTANT_CONTROL_BITS, u32::from(control_bits)),
             (CONSTANT_CONTROL_CHOICE, u32::from(control_choice)),
         ];
-        let output = support::run_specialized_probe(
+        let answers: Vec<Answer> = support::run_probe(
             include_bytes!(concat!(env!("OUT_DIR"), "/test/control_variates.spv")),
             &[&control[..], &grid.constants()].concat(),
-            &[
-                (scene::PARAMETERS, bytemuck::bytes_of(&parameters)),
-                (probe::PROBE_INPUT, bytemuck::cast_slice(&queries)),
-            ],
-            queries.len() * size_of::<Answer>(),
-            queries.len() as u32,
+            &[(scene::PARAMETERS, bytemuck::bytes_of(&parameters))],
+            &queries,
         );
-        let answers: &[Answer] = bytemuck::cast_slice(&output);
         let (mut other_entries, mut other_choices, mut negative) = (0, 0, 0);
-        for (query, answer) in queries.iter().zip(answers) {
+        for (query, answer) in queries.iter().zip(&answers) {
             let record = record_of(grid, query.position.into(), query.normal.into(), camera);
             other_entries += u32::from(answer.entry != entry(grid, record, query.direction.into()));
             let candidates = query

@@ -11,11 +11,7 @@ use fenestra::{
     },
     scene::environment::{EnvironmentMap, EnvironmentTables},
     session::{Renderer, Settings},
-    shader::{
-        bindings::{probe, scene},
-        constants::CONSTANT_COMPENSATION,
-        structs::SceneParameters,
-    },
+    shader::{bindings::scene, constants::CONSTANT_COMPENSATION, structs::SceneParameters},
 };
 use glam::{Vec2, Vec3};
 
@@ -411,11 +407,10 @@ fn the_shader_agrees() {
             }
             let texel = |texel: &Vec3| texel.extend(all[1].weight(*texel)).to_array();
             let texels: Vec<[f32; 4]> = map.texels.iter().map(texel).collect();
-            let output = support::run_specialized_probe(
+            let output: Vec<[f32; 11]> = support::run_probe(
                 ENVIRONMENT_PROBE,
                 &[(CONSTANT_COMPENSATION, compensates as u32)],
                 &[
-                    (probe::PROBE_INPUT, bytemuck::cast_slice(&inputs)),
                     (scene::PARAMETERS, bytemuck::bytes_of(&parameters)),
                     (scene::ENVIRONMENT_TEXELS, bytemuck::cast_slice(&texels)),
                     (scene::ENVIRONMENT_ROWS, bytemuck::cast_slice(&all[0].rows)),
@@ -423,13 +418,11 @@ fn the_shader_agrees() {
                     (scene::COMPENSATED_ROWS, bytemuck::cast_slice(&all[1].rows)),
                     (scene::COMPENSATED_CELLS, bytemuck::cast_slice(&all[1].cells)),
                 ],
-                inputs.len() * 11 * 4,
-                inputs.len() as u32,
+                &inputs,
             );
-            let output: &[[f32; 11]] = bytemuck::cast_slice(&output);
             let brightest = map.texels.iter().map(|texel| texel.max_element()).fold(0.0, f32::max);
             let mut different_rows = 0;
-            for (input, shader) in inputs.iter().zip(output) {
+            for (input, shader) in inputs.iter().zip(&output) {
                 let direction = Vec3::from_slice(input);
                 let radiance = map.radiance(direction);
                 assert!(

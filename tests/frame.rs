@@ -1,12 +1,9 @@
 //! Frames and the lat-long mapping: properties on the host, and the shader twin.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
-use fenestra::{
-    math::{
-        frame::{direction_from_lat_long, frame_from_normal, lat_long_from_direction, sin_cos_pi},
-        random::random_independent_2d,
-    },
-    shader::bindings::probe,
+use fenestra::math::{
+    frame::{direction_from_lat_long, frame_from_normal, lat_long_from_direction, sin_cos_pi},
+    random::random_independent_2d,
 };
 use glam::{Vec2, Vec3};
 
@@ -93,15 +90,9 @@ fn the_shader_agrees() {
             input
         })
         .collect();
-    let output = support::run_probe(
-        FRAME_PROBE,
-        &[(probe::PROBE_INPUT, bytemuck::cast_slice(&inputs))],
-        inputs.len() * 16 * 4,
-        inputs.len() as u32,
-    );
-    let output: &[[f32; 16]] = bytemuck::cast_slice(&output);
+    let output: Vec<[f32; 16]> = support::run_probe(FRAME_PROBE, &[], &[], &inputs);
     let mut worst = [0.0_f32; 16];
-    for (input, shader) in inputs.iter().zip(output) {
+    for (input, shader) in inputs.iter().zip(&output) {
         let (normal, direction) = (Vec3::from_slice(input), Vec3::from_slice(&input[3..]));
         let uv = Vec2::from_slice(&input[6..]);
         let frame = frame_from_normal(normal);

@@ -6,7 +6,7 @@
 
 use fenestra::{
     brdf::MaterialTables,
-    gpu::{Buffer, Commands, DescriptorSet, Pipeline},
+    gpu::{Commands, Pipeline},
     math::{
         frame::frame_from_normal,
         random::{hash_4d, random_independent_2d},
@@ -22,7 +22,6 @@ use fenestra::{
     scene::Scene,
     session::{Renderer, Settings, window_of},
     shader::{
-        bindings::{PROBE, probe},
         constants::CONSTANT_MATERIAL_KINDS,
         rooms::guided::CONSTANT_BOUNCE_CANDIDATES,
         spirv,
@@ -33,7 +32,7 @@ use glam::{Vec3, vec3};
 
 use crate::{
     support::{
-        self,
+        self, PathInput,
         guide::Guide as _,
         materials,
         replicates::{self, BLOCK},
@@ -60,18 +59,11 @@ fn the_shader_tells_directions_apart_as_the_host_does() {
         .map(|number| uniform_direction(random_independent_2d(number, 0, 0, 1)))
         .collect();
     directions.extend([Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z]);
-    let input: Vec<[f32; 3]> = directions.iter().map(|direction| direction.to_array()).collect();
     let count = directions.len();
-    let output = support::run_probe(
-        ARRIVING_PROBE,
-        &[(probe::PROBE_INPUT, bytemuck::cast_slice(&input))],
-        4 * count,
-        count as u32,
-    );
-    let output: &[u32] = bytemuck::cast_slice(&output);
+    let output: Vec<u32> = support::run_probe(ARRIVING_PROBE, &[], &[], &directions);
     let mut seen = [0_u32; ARRIVAL_DIRECTIONS];
     let mut differing = 0;
-    for (direction, shader) in directions.iter().zip(output) {
+    for (direction, shader) in directions.iter().zip(&output) {
         let host = arrival_direction(*direction);
         seen[host] += 1;
         differing += u32::from(host != *shader as usize);
@@ -147,20 +139,11 @@ fn bounce(
         WaveBuffers::new(device, PIXELS, 1 << 17, 1, PathDemand::default(), Surfaces::default())
             .unwrap();
     assert!(waves.capacity() >= paths);
-    let input = support::PathInput {
-        normal: floor.normal.into(),
-        material: 0,
-        outgoing: floor.outgoing.into(),
-        shadow_direction: [0.0, 1.0, 0.0],
-        is_visible: 1,
-    };
-    let input = Buffer::from_slice(device, "paths", &vec![input; paths as usize]).unwrap();
-    let film = DescriptorSet::new(device, &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
+    let input = PathInput::new(0, floor.normal, floor.outgoing);
+    PathInput::put(&vec![input; paths as usize], &waves);
     let states = vec![PathState { throughput: [1.0; 3], ..PathState::default() }; paths as usize];
     waves.paths().upload(bytemuck::cast_slice(&states)).unwrap();
 
-    let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
-    let put = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
     let kinds = (CONSTANT_MATERIAL_KINDS, buffers.surfaces().material_kinds);
     let create = |name: &str, constants: &[(u32, u32)]| {
         Pipeline::new(device, name, spirv::pass(name), constants).unwrap()
@@ -180,7 +163,6 @@ fn bounce(
     let sets = [buffers.set(), guide.set(), waves.set()];
     let push = bytemuck::bytes_of(&wave);
     let mut commands = Commands::begin(device).unwrap();
-    commands.dispatch(&put, &[waves.set(), &film], &[], paths);
     // Find the cell.
     commands.dispatch(&sample, &sets, push, paths);
     commands.dispatch(&bounce, &sets, push, paths);

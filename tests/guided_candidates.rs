@@ -12,7 +12,6 @@ use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
-    gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     pass::{PathDemand, SceneBuffers, Surfaces, WaveBuffers},
     sampler::{
         Parameters, Sampler,
@@ -21,7 +20,6 @@ use fenestra::{
     scene::Scene,
     session::{Renderer, Settings, window_of},
     shader::{
-        bindings::{PROBE, probe},
         constants::{CONSTANT_CANDIDATES, CONSTANT_MATERIAL_KINDS},
         rooms::guided::CONSTANT_BRDF_CANDIDATES,
         structs::Wave,
@@ -30,7 +28,7 @@ use fenestra::{
 use glam::{DMat3, DVec3, Vec3, dvec3, vec3};
 
 use crate::support::{
-    self,
+    self, PathInput,
     guide::Guide as _,
     hemisphere::{self, BINS},
     materials, scenes, statistics,
@@ -159,37 +157,18 @@ impl Paths {
 
     /// Writes the ray and the hit of the path.
     fn put(&self, surface: &Surface) {
-        let input = support::PathInput {
-            normal: surface.normal.as_vec3().into(),
-            material: surface.material,
-            outgoing: surface.outgoing().into(),
-            shadow_direction: [0.0, 1.0, 0.0],
-            is_visible: 1,
-        };
-        let device = support::device();
-        let input = Buffer::from_slice(device, "paths", &[input]).unwrap();
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
-        let pipeline = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
-        let film = DescriptorSet::new(device, &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
-        let mut commands = Commands::begin(device).unwrap();
-        commands.dispatch(&pipeline, &[self.waves.set(), &film], &[], 1);
-        commands.submit_and_wait().unwrap();
+        let normal = surface.normal.as_vec3();
+        let input = PathInput::new(surface.material, normal, surface.outgoing());
+        PathInput::put(&[input], &self.waves);
     }
 
     fn probe(&self, candidates: u32, queries: &[CandidateQuery]) -> Vec<CandidateAnswer> {
-        let device = support::device();
         let constants = [
             (CONSTANT_CANDIDATES, candidates),
             (CONSTANT_BRDF_CANDIDATES, candidates / 4),
             (CONSTANT_MATERIAL_KINDS, self.scene.surfaces().material_kinds),
         ];
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/guided_candidates.spv"));
-        let pipeline = Pipeline::new(device, "guided_candidates", spirv, &constants).unwrap();
-        let input = Buffer::from_slice(device, "queries", queries).unwrap();
-        let bytes = (queries.len() * size_of::<CandidateAnswer>()) as u64;
-        let output = Buffer::zeroed(device, "answers", bytes).unwrap();
-        let bound = [(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)];
-        let film = DescriptorSet::new(device, &PROBE, &bound).unwrap();
         let wave = Wave {
             pixel_count: 1,
             sample_count: 1,
@@ -198,13 +177,8 @@ impl Paths {
             epoch_seed: 0x5eed + candidates,
             ..Wave::default()
         };
-        let sets = [self.scene.set(), self.guide.set(), self.waves.set(), &film];
-        let mut commands = Commands::begin(device).unwrap();
-        commands.dispatch(&pipeline, &sets, bytemuck::bytes_of(&wave), queries.len() as u32);
-        commands.submit_and_wait().unwrap();
-        let answers = output.download(queries.len()).unwrap();
-        support::assert_silent();
-        answers
+        let sets = [self.scene.set(), self.guide.set(), self.waves.set()];
+        support::run_probe_with(spirv, &constants, &sets, bytemuck::bytes_of(&wave), queries)
     }
 
     /// Draws the candidates of many rays and counts them by bin.

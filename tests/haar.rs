@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     brdf::MaterialTables,
-    gpu::{Buffer, Commands, DescriptorSet, Pipeline},
+    gpu::Commands,
     math::{equal_area::direction_from_square, frame::frame_from_normal, octahedron},
     pass::{Kernel, Pass, SceneBuffers, Steps, Surfaces, WaveBuffers},
     sampler::{
@@ -24,7 +24,6 @@ use fenestra::{
     scene::Scene,
     session::{Settings, window_of},
     shader::{
-        bindings::{PROBE, probe},
         rooms::haar::{CONSTANT_HAAR_DEPTH, CONSTANT_HAAR_LEVEL},
         rooms::product::{CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_SHARE},
         structs::Wave,
@@ -35,7 +34,7 @@ use half::f16;
 
 use crate::{
     support::{
-        self, materials, replicates, scenes,
+        self, PathInput, materials, replicates, scenes,
         statistics::{chi_square_p_value, z_of_mean},
     },
     twin::haar::{Product, node_reflectance},
@@ -88,20 +87,13 @@ impl Answer {
     }
 }
 
-/// Material, normal and outgoing direction of a surface.
-struct Surface {
-    material: u32,
-    normal: Vec3,
-    outgoing: Vec3,
-}
-
 /// Returns diffuse, plastic, conductor and measured surfaces, seen from different angles.
-fn surfaces() -> Vec<Surface> {
+fn surfaces() -> Vec<PathInput> {
     let surface = |material, normal: Vec3, theta: f32, phi: f32| {
         let normal = normal.normalize();
         let (sine, cosine) = theta.sin_cos();
         let local = vec3(sine * phi.cos(), sine * phi.sin(), cosine);
-        Surface { material, normal, outgoing: frame_from_normal(normal).to_world(local) }
+        PathInput::new(material, normal, frame_from_normal(normal).to_world(local))
     };
     vec![
         surface(0, vec3(0.1, 1.0, 0.2), 0.5, 0.1),
@@ -124,7 +116,7 @@ fn scene() -> Scene {
 
 /// Passes and buffers around one wave of paths, one per surface.
 struct Paths {
-    surfaces: Vec<Surface>,
+    surfaces: Vec<PathInput>,
     parameters: Parameters,
     tables: MaterialTables,
     tree: Tree,
@@ -158,7 +150,7 @@ impl Paths {
         let tables = MaterialTables::new(&scene.materials).unwrap();
         let paths =
             Self { surfaces, parameters, tables, tree, scene: buffers, nodes, waves, steps, wave };
-        paths.put(&vec![(Vec3::Y, true); paths.surfaces.len()]);
+        PathInput::put(&paths.surfaces, &paths.waves);
         paths.run(paths.steps.prepare(&paths.wave));
         paths
     }
@@ -179,26 +171,11 @@ impl Paths {
         support::assert_silent();
     }
 
-    /// Writes ray, hit, and a shadow ray with its outcome for every path.
-    fn put(&self, outcomes: &[(Vec3, bool)]) {
-        let inputs: Vec<support::PathInput> = self
-            .surfaces
-            .iter()
-            .zip(outcomes)
-            .map(|(surface, (direction, is_visible))| support::PathInput {
-                normal: surface.normal.into(),
-                material: surface.material,
-                outgoing: surface.outgoing.into(),
-                shadow_direction: (*direction).into(),
-                is_visible: u32::from(*is_visible),
-            })
-            .collect();
-        support::PathInput::put(&inputs, &self.waves);
-    }
-
     /// Teaches the caches the outcome of one shadow ray per path.
     fn learn(&self, outcomes: &[(Vec3, bool)]) {
-        self.put(outcomes);
+        let surfaces = self.surfaces.iter().zip(outcomes);
+        let inputs: Vec<_> = surfaces.map(|(path, outcome)| path.with_outcome(*outcome)).collect();
+        PathInput::put(&inputs, &self.waves);
         self.run(self.steps.after_shadow_rays(&self.wave));
     }
 
@@ -211,10 +188,6 @@ impl Paths {
     }
 
     fn probe(&self, queries: &[Query]) -> Vec<Answer> {
-        let device = support::device();
-        let input = Buffer::from_slice(device, "queries", queries).unwrap();
-        let bytes = size_of_val(queries) / size_of::<Query>() * size_of::<Answer>();
-        let output = Buffer::zeroed(device, "answers", bytes as u64).unwrap();
         let shares = self.parameters.product;
         let constants = [
             (CONSTANT_BRDF_SHARE, shares.brdf_share.to_bits()),
@@ -223,17 +196,9 @@ impl Paths {
             (CONSTANT_HAAR_DEPTH, self.tree.depth()),
         ];
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/haar.spv"));
-        let pipeline = Pipeline::new(device, "haar", spirv, &constants).unwrap();
-        let bound = [(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)];
-        let film = DescriptorSet::new(device, &PROBE, &bound).unwrap();
-        let sets = [self.scene.set(), self.nodes.set(), self.waves.set(), &film];
-        let mut commands = Commands::begin(device).unwrap();
+        let sets = [self.scene.set(), self.nodes.set(), self.waves.set()];
         let push = bytemuck::bytes_of(&self.wave);
-        commands.dispatch(&pipeline, &sets, push, queries.len() as u32);
-        commands.submit_and_wait().unwrap();
-        let answers = output.download(queries.len()).unwrap();
-        support::assert_silent();
-        answers
+        support::run_probe_with(spirv, &constants, &sets, push, queries)
     }
 
     /// Draws directions of one path; from its nodes alone if `only_nodes`.

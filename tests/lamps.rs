@@ -6,16 +6,12 @@ use std::collections::BTreeMap;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     film::Window,
-    gpu::{Buffer, Commands, DescriptorSet, Pipeline},
     math::random::hash_4d,
     pass::SceneBuffers,
     sampler::Sampler,
     scene::Scene,
     session::Settings,
-    shader::{
-        bindings::{PROBE, probe},
-        constants::{CONSTANT_SURFACES, SURFACES_LAMP_CELLS},
-    },
+    shader::constants::{CONSTANT_SURFACES, SURFACES_LAMP_CELLS},
 };
 
 use crate::support::{
@@ -87,20 +83,10 @@ fn draws(scene: &SceneBuffers, position: [f32; 3]) -> Vec<Answer> {
         let [a, b, ..] = hash_4d([draw, 1, 2, 3]);
         Query { position, normal: [0.0, 1.0, 0.0], bits: [a, b] }
     };
-    let device = support::device();
     let queries: Vec<Query> = (0..DRAWS).map(query).collect();
-    let input = Buffer::from_slice(device, "queries", &queries).unwrap();
-    let bytes = size_of::<Answer>() * queries.len();
-    let output = Buffer::zeroed(device, "answers", bytes as u64).unwrap();
     let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/lamps.spv"));
     let constants = [(CONSTANT_SURFACES, scene.surfaces().features)];
-    let pipeline = Pipeline::new(device, "lamps", spirv, &constants).unwrap();
-    let bound = [(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)];
-    let probe = DescriptorSet::new(device, &PROBE, &bound).unwrap();
-    let mut commands = Commands::begin(device).unwrap();
-    commands.dispatch(&pipeline, &[scene.set(), &probe], &[], DRAWS);
-    commands.submit_and_wait().unwrap();
-    output.download(queries.len()).unwrap()
+    support::run_probe_with(spirv, &constants, &[scene.set()], &[], &queries)
 }
 
 #[test]
@@ -140,7 +126,6 @@ fn lamps_are_drawn_as_their_probabilities_say() {
         likely.push(shares[0].1);
     }
     assert_ne!(likely[0], likely[1]);
-    support::assert_silent();
 }
 
 /// Alone, its lamp is all there is and drawn by power.

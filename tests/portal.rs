@@ -9,7 +9,6 @@ use fenestra::{
     sampler::Sampler,
     scene::{Portal, Scene},
     session::Settings,
-    shader::bindings::probe,
 };
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
@@ -137,14 +136,8 @@ fn the_shader_agrees() {
         input[7..].copy_from_slice(&at.to_array());
         inputs.push(input);
     }
-    let output = support::run_probe(
-        RECTANGLE_PROBE,
-        &[(probe::PROBE_INPUT, bytemuck::cast_slice(&inputs))],
-        inputs.len() * 5 * 4,
-        inputs.len() as u32,
-    );
-    let output: &[[f32; 5]] = bytemuck::cast_slice(&output);
-    for (input, shader) in inputs.iter().zip(output) {
+    let output: Vec<[f32; 5]> = support::run_probe(RECTANGLE_PROBE, &[], &[], &inputs);
+    for (input, shader) in inputs.iter().zip(&output) {
         let rectangle = seen(Vec3::from_slice(input), Vec2::from_slice(&input[3..]));
         let direction = rectangle.sample(Vec2::from_slice(&input[5..]));
         let pdf = rectangle.pdf(Vec3::from_slice(&input[7..]));

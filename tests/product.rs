@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
-    gpu::{Buffer, Commands, DescriptorSet, Pipeline},
+    gpu::{Buffer, Commands, DescriptorSet},
     pass::{Kernel, Pass, SceneBuffers, Steps, Surfaces, WaveBuffers, geometry::Traversal},
     sampler::{
         Parameters,
@@ -22,7 +22,7 @@ use fenestra::{
     scene::Scene,
     session::{Settings, window_of},
     shader::{
-        bindings::{FILM, PROBE, film, probe},
+        bindings::{FILM, film},
         rooms::product::{
             CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_SHARE, CONSTANT_KEPT_LOBES, CONSTANT_READING,
         },
@@ -36,7 +36,7 @@ use fenestra::{
 use glam::{DVec3, Vec3, dvec3};
 
 use crate::{
-    support::{self, materials, scenes, statistics},
+    support::{self, PathInput, materials, scenes, statistics},
     twin::srbf::{kernel_deviation, kernel_hemisphere_part, kernel_pdf},
 };
 
@@ -218,7 +218,7 @@ impl Paths {
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64).unwrap();
         let paths =
             Self { surfaces, parameters, scene: buffers, lobes, waves, steps, counters, wave };
-        paths.put(&vec![(DVec3::Y, true); paths.surfaces.len()]);
+        PathInput::put(&paths.inputs(), &paths.waves);
         paths.run(paths.steps.prepare(&paths.wave));
         paths
     }
@@ -236,57 +236,33 @@ impl Paths {
         }
     }
 
-    /// Writes ray, hit, and a shadow ray with its outcome for every path.
-    fn put(&self, outcomes: &[(DVec3, bool)]) {
-        let inputs: Vec<support::PathInput> = self
-            .surfaces
-            .iter()
-            .zip(outcomes)
-            .map(|(surface, (direction, is_visible))| support::PathInput {
-                normal: surface.normal.as_vec3().into(),
-                material: surface.material,
-                outgoing: surface.to_world(surface.theta, 0.4).as_vec3().into(),
-                shadow_direction: direction.as_vec3().into(),
-                is_visible: u32::from(*is_visible),
-            })
-            .collect();
-        support::PathInput::put(&inputs, &self.waves);
+    fn inputs(&self) -> Vec<PathInput> {
+        let input = |surface: &Surface| {
+            let outgoing = surface.to_world(surface.theta, 0.4).as_vec3();
+            PathInput::new(surface.material, surface.normal.as_vec3(), outgoing)
+        };
+        self.surfaces.iter().map(input).collect()
     }
 
     /// Teaches the caches the outcome of one shadow ray per path.
     fn learn(&self, outcomes: &[(DVec3, bool)]) {
-        self.put(outcomes);
+        let input = |(path, (direction, is_visible)): (PathInput, &(DVec3, bool))| {
+            path.with_outcome((direction.as_vec3(), *is_visible))
+        };
+        let inputs: Vec<_> = self.inputs().into_iter().zip(outcomes).map(input).collect();
+        PathInput::put(&inputs, &self.waves);
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_learn.spv"));
-        let densities: Vec<f32> =
-            self.probe(spirv, false, &self.constants(), &vec![0_u32; self.surfaces.len()]);
+        let densities: Vec<f32> = self.probe(spirv, false, &vec![0_u32; self.surfaces.len()]);
         assert!(densities.iter().all(|density| *density > 0.0), "{densities:?}");
     }
 
-    fn probe<Q: Pod, A: Pod>(
-        &self,
-        spirv: &[u8],
-        with_scene: bool,
-        constants: &[(u32, u32)],
-        queries: &[Q],
-    ) -> Vec<A> {
-        let device = support::device();
-        let input = Buffer::from_slice(device, "queries", queries).unwrap();
-        let bytes = (queries.len() * size_of::<A>()) as u64;
-        let output = Buffer::zeroed(device, "answers", bytes).unwrap();
-        let pipeline = Pipeline::new(device, "probe", spirv, constants).unwrap();
-        let bound = [(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)];
-        let film = DescriptorSet::new(device, &PROBE, &bound).unwrap();
-        let mut sets = vec![self.waves.set(), self.lobes.set(), &film];
+    fn probe<Q: Pod, A: Pod>(&self, spirv: &[u8], with_scene: bool, queries: &[Q]) -> Vec<A> {
+        let mut sets = vec![self.waves.set(), self.lobes.set()];
         if with_scene {
             sets.push(self.scene.set());
         }
-        let mut commands = Commands::begin(device).unwrap();
         let push = bytemuck::bytes_of(&self.wave);
-        commands.dispatch(&pipeline, &sets, push, queries.len() as u32);
-        commands.submit_and_wait().unwrap();
-        let answers = output.download(queries.len()).unwrap();
-        support::assert_silent();
-        answers
+        support::run_probe_with(spirv, &self.constants(), &sets, push, queries)
     }
 
     /// Returns the passes' specialization constants, for the probes.
@@ -307,7 +283,7 @@ impl Paths {
 
     fn mixture(&self, queries: &[MixtureQuery]) -> Vec<MixtureAnswer> {
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_mixture.spv"));
-        self.probe(spirv, true, &self.constants(), queries)
+        self.probe(spirv, true, queries)
     }
 
     /// Draws `count` directions of every path, path by path, with numbers of the given stream.
@@ -358,7 +334,7 @@ impl Paths {
             .flat_map(|path| (0..kept).map(move |lobe| [path, lobe]))
             .collect();
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_lobe.spv"));
-        let answers: Vec<LobeAnswer> = self.probe(spirv, false, &self.constants(), &queries);
+        let answers: Vec<LobeAnswer> = self.probe(spirv, false, &queries);
         answers
             .chunks(kept as usize)
             .map(|lobes| lobes[..lobes[0].lobe_count as usize].to_vec())

@@ -1,9 +1,6 @@
 //! Random numbers: stratification, uniformity, independence, and the shader twin bit for bit.
 
-use fenestra::{
-    math::random::{random_independent_1d, random_independent_2d},
-    shader::bindings::probe,
-};
+use fenestra::math::random::{random_independent_1d, random_independent_2d};
 
 use crate::{
     support::{
@@ -194,14 +191,7 @@ fn the_shader_draws_the_same_numbers_bit_for_bit() {
     }
     keys.push([u32::MAX; 4]);
     keys.push([0; 4]);
-    let words = 6;
-    let output = support::run_probe(
-        RANDOM_PROBE,
-        &[(probe::PROBE_INPUT, bytemuck::cast_slice(&keys))],
-        keys.len() * words * 4,
-        keys.len() as u32,
-    );
-    let output: &[[f32; 6]] = bytemuck::cast_slice(&output);
+    let output: Vec<[f32; 6]> = support::run_probe(RANDOM_PROBE, &[], &[], &keys);
     for (&[pixel, sample, dimension, seed], shader) in keys.iter().zip(output) {
         let stratified = random_2d(pixel, sample, dimension, seed);
         let independent = random_independent_2d(pixel, sample, dimension, seed);

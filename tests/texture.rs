@@ -21,7 +21,7 @@ use fenestra::{
     },
     session::Settings,
     shader::{
-        bindings::{Binding, probe, scene},
+        bindings::{Binding, scene},
         constants::{
             ATTRIBUTE_COLOR, ATTRIBUTE_FIRST_UVS, ATTRIBUTE_SECOND_UVS, ATTRIBUTE_TANGENT,
             CONSTANT_ATTRIBUTE_PAGE_SHIFT, CONSTANT_ATTRIBUTE_PAGES, CONSTANT_ATTRIBUTES,
@@ -517,7 +517,6 @@ fn compare(bits: u32) {
     let (attribute_pages, more) = pages(attribute_words, shift, attribute_names);
     buffers.extend(more);
     buffers.extend([
-        (probe::PROBE_INPUT, bytemuck::cast_slice(&queries)),
         (scene::TEXTURE_USE_TEXELS, bytemuck::cast_slice(&textures.uses)),
         (scene::MATERIAL_SURFACE_TEXELS, bytemuck::cast_slice(&surfaces.surfaces)),
         // No instances: the shader leaves this alone.
@@ -535,14 +534,12 @@ fn compare(bits: u32) {
         (CONSTANT_ATTRIBUTE_PAGE_SHIFT, shift),
         (CONSTANT_ATTRIBUTES, attributes.bits),
     ];
-    let answers: Vec<TextureAnswer> =
-        bytemuck::pod_collect_to_vec(&support::run_specialized_probe(
-            include_bytes!(concat!(env!("OUT_DIR"), "/test/texture.spv")),
-            &constants,
-            &buffers,
-            size_of::<TextureAnswer>() * queries.len(),
-            queries.len() as u32,
-        ));
+    let answers: Vec<TextureAnswer> = support::run_probe(
+        include_bytes!(concat!(env!("OUT_DIR"), "/test/texture.spv")),
+        &constants,
+        &buffers,
+        &queries,
+    );
 
     // Rounding may move a point into the next texel of a texture without interpolation, and turn an
     // opacity at its cutoff.

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     brdf::MaterialTables,
-    gpu::{Buffer, Commands, DescriptorSet, Pipeline},
+    gpu::Commands,
     math::{equal_area::direction_from_square, frame::frame_from_normal, random::hash_4d},
     pass::{Pass, PathDemand, SceneBuffers, Steps, Surfaces, WaveBuffers},
     sampler::{
@@ -27,7 +27,6 @@ use fenestra::{
     },
     session::{Settings, window_of},
     shader::{
-        bindings::{PROBE, probe},
         rooms::tiles::{CONSTANT_TILES, TILE_RESPONSE_UNITS, TILE_SCALE},
         structs::{SceneParameters, ShadowRay, Wave},
     },
@@ -36,7 +35,7 @@ use glam::{DVec3, Vec2, Vec3, vec2, vec3};
 
 use crate::{
     support::{
-        self,
+        self, PathInput,
         hemisphere::{self, BINS},
         materials, render, replicates, scenes,
         statistics::chi_square_p_value,
@@ -288,22 +287,9 @@ impl Cache {
     }
 
     fn probe(&self, queries: &[Query]) -> Vec<Answer> {
-        let device = support::device();
-        let input = Buffer::from_slice(device, "queries", queries).unwrap();
-        let bytes = queries.len() * size_of::<Answer>();
-        let output = Buffer::zeroed(device, "answers", bytes as u64).unwrap();
         let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/tiles.spv"));
-        let pipeline =
-            Pipeline::new(device, "tiles", spirv, &[(CONSTANT_TILES, self.tiles)]).unwrap();
-        let bound = [(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)];
-        let film = DescriptorSet::new(device, &PROBE, &bound).unwrap();
-        let sets = [self.scene_buffers.set(), self.buffers.set(), &film];
-        let mut commands = Commands::begin(device).unwrap();
-        commands.dispatch(&pipeline, &sets, &[], queries.len() as u32);
-        commands.submit_and_wait().unwrap();
-        let answers = output.download(queries.len()).unwrap();
-        support::assert_silent();
-        answers
+        let sets = [self.scene_buffers.set(), self.buffers.set()];
+        support::run_probe_with(spirv, &[(CONSTANT_TILES, self.tiles)], &sets, &[], queries)
     }
 }
 
@@ -372,20 +358,9 @@ fn rays_follow_the_density_that_they_are_divided_by() {
     let surface = |index: u32| {
         let normal = vec3(0.3 * index as f32 - 0.4, 1.0, 0.2).normalize();
         let outgoing = frame_from_normal(normal).to_world(vec3(0.6, 0.0, 0.8));
-        (normal, outgoing)
+        PathInput::new(index, normal, outgoing)
     };
-    let inputs: Vec<support::PathInput> = (0..4 * PATHS)
-        .map(|path| {
-            let (normal, outgoing) = surface(path / PATHS);
-            support::PathInput {
-                normal: normal.into(),
-                material: path / PATHS,
-                outgoing: outgoing.into(),
-                shadow_direction: [0.0, 1.0, 0.0],
-                is_visible: 1,
-            }
-        })
-        .collect();
+    let inputs: Vec<PathInput> = (0..4 * PATHS).map(|path| surface(path / PATHS)).collect();
     let mut of_states: Vec<[Vec<f64>; 4]> = Vec::new();
     for is_learned in [false, true] {
         let cache = Cache::new(scene(), 128, is_learned);
@@ -398,10 +373,7 @@ fn rays_follow_the_density_that_they_are_divided_by() {
             Surfaces::default(),
         )
         .unwrap();
-        let input = Buffer::from_slice(device, "paths", &inputs).unwrap();
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
-        let pipeline = Pipeline::new(device, "product_state", spirv, &[]).unwrap();
-        let film = DescriptorSet::new(device, &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
+        PathInput::put(&inputs, &waves);
         let wave = Wave {
             pixel_count: 4 * PATHS,
             sample_count: 1,
@@ -411,9 +383,6 @@ fn rays_follow_the_density_that_they_are_divided_by() {
             seed: 3,
             ..Wave::default()
         };
-        let mut commands = Commands::begin(device).unwrap();
-        commands.dispatch(&pipeline, &[waves.set(), &film], &[], 4 * PATHS);
-        commands.submit_and_wait().unwrap();
         for kernel in cache.steps.sample(&wave) {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
@@ -432,7 +401,7 @@ fn rays_follow_the_density_that_they_are_divided_by() {
         let density = cache.density(&tables, sector);
         of_states.push([0, 1, 2, 3].map(|material: usize| {
             let name = format!("material {material}, learned {is_learned}");
-            let (normal, outgoing) = surface(material as u32);
+            let PathInput { normal, outgoing, .. } = surface(material as u32);
             let frame = frame_from_normal(normal);
             let outgoing = frame.to_local(outgoing);
             let evaluate = |direction: Vec3| {

@@ -23,7 +23,10 @@ pub mod source;
 pub mod statistics;
 pub mod x11;
 
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::{
+    borrow::Borrow,
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
+};
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
@@ -33,12 +36,9 @@ use fenestra::{
     sampler::Parameters,
     scene::Scene,
     session::{Renderer, Settings},
-    shader::{
-        bindings::{Binding, PROBE, probe},
-        constants::WORKGROUP_SIZE,
-        rooms,
-    },
+    shader::bindings::{Binding, PROBE, SCENE, probe},
 };
+use glam::Vec3;
 
 /// Gives the calling test the device to itself: the validation layers 1.3.239 crash at times where several
 /// threads make and drop renderers, of one device or of two.
@@ -59,14 +59,24 @@ pub fn parameters(assignments: &[&str]) -> Parameters {
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct PathInput {
-    pub normal: [f32; 3],
+    pub normal: Vec3,
     pub material: u32,
-    pub outgoing: [f32; 3],
-    pub shadow_direction: [f32; 3],
-    pub is_visible: u32,
+    pub outgoing: Vec3,
+    shadow_direction: Vec3,
+    is_visible: u32,
 }
 
 impl PathInput {
+    /// A surface whose shadow ray goes up and is visible.
+    pub fn new(material: u32, normal: Vec3, outgoing: Vec3) -> Self {
+        Self { normal, material, outgoing, shadow_direction: Vec3::Y, is_visible: 1 }
+    }
+
+    /// The same surface with another shadow ray.
+    pub fn with_outcome(self, (shadow_direction, is_visible): (Vec3, bool)) -> Self {
+        Self { shadow_direction, is_visible: u32::from(is_visible), ..self }
+    }
+
     /// Writes ray, hit, and a shadow ray with its outcome for every path of a wave.
     pub fn put(inputs: &[Self], waves: &WaveBuffers) {
         let input = Buffer::from_slice(device(), "paths", inputs).unwrap();
@@ -129,49 +139,44 @@ pub fn assert_error<T>(result: Result<T, impl ToString>, parts: &[&str]) {
     }
 }
 
-/// Runs a probe shader over `invocations` invocations and returns its output.
-pub fn run_probe(
-    spirv: &[u8],
-    buffers: &[(Binding, &[u8])],
-    output_bytes: usize,
-    invocations: u32,
-) -> Vec<u8> {
-    run_specialized_probe(spirv, &[], buffers, output_bytes, invocations)
-}
-
-/// As [`run_probe`], with specialization constants.
-pub fn run_specialized_probe(
+/// Runs a probe kernel over `queries` with specialization constants and with buffers of the scene, and returns
+/// its answer to each.
+pub fn run_probe<Q: Pod, A: Pod>(
     spirv: &[u8],
     constants: &[(u32, u32)],
     buffers: &[(Binding, &[u8])],
-    output_bytes: usize,
-    invocations: u32,
-) -> Vec<u8> {
-    let device = device();
+    queries: &[Q],
+) -> Vec<A> {
     let upload = |(binding, bytes): &(Binding, &[u8])| {
-        (*binding, Buffer::from_slice(device, binding.name, bytes).unwrap())
+        (*binding, Buffer::from_slice(device(), binding.name, bytes).unwrap())
     };
     let uploaded: Vec<(Binding, Buffer)> = buffers.iter().map(upload).collect();
-    let output = Buffer::zeroed(device, "probe output", output_bytes as u64).unwrap();
-    let mut bound: Vec<_> = uploaded.iter().map(|(binding, buffer)| (*binding, buffer)).collect();
-    bound.push((probe::PROBE_OUTPUT, &output));
-    let sets: Vec<DescriptorSet> = rooms::tables()
-        .filter_map(|table| {
-            let is_in_table = |(binding, _): &&(Binding, _)| table.bindings.contains(binding);
-            let buffers: Vec<_> = bound.iter().filter(is_in_table).copied().collect();
-            (!buffers.is_empty()).then(|| DescriptorSet::new(device, table, &buffers).unwrap())
-        })
-        .collect();
+    let bound: Vec<_> = uploaded.iter().map(|(binding, buffer)| (*binding, buffer)).collect();
+    let make = || DescriptorSet::new(device(), &SCENE, &bound).unwrap();
+    let scene = (!bound.is_empty()).then(make);
+    run_probe_with(spirv, constants, scene.as_slice(), &[], queries)
+}
+
+/// As [`run_probe`], with the sets and the push constants of a pass.
+pub fn run_probe_with<Q: Pod, A: Pod>(
+    spirv: &[u8],
+    constants: &[(u32, u32)],
+    sets: &[impl Borrow<DescriptorSet>],
+    push: &[u8],
+    queries: &[Q],
+) -> Vec<A> {
+    let device = device();
+    let input = Buffer::from_slice(device, "queries", queries).unwrap();
+    let bytes = (queries.len() * size_of::<A>()) as u64;
+    let output = Buffer::zeroed(device, "answers", bytes).unwrap();
+    let bound = [(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)];
+    let own = DescriptorSet::new(device, &PROBE, &bound).unwrap();
     let pipeline = Pipeline::new(device, "probe", spirv, constants).unwrap();
+    let sets: Vec<_> = sets.iter().map(Borrow::borrow).chain([&own]).collect();
     let mut commands = Commands::begin(device).unwrap();
-    commands.dispatch(
-        &pipeline,
-        &sets.iter().collect::<Vec<_>>(),
-        &[],
-        invocations.next_multiple_of(WORKGROUP_SIZE),
-    );
+    commands.dispatch(&pipeline, &sets, push, queries.len() as u32);
     commands.submit_and_wait().unwrap();
-    let result = output.download(output_bytes).unwrap();
+    let answers = output.download(queries.len()).unwrap();
     assert_silent();
-    result
+    answers
 }
