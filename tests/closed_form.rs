@@ -19,35 +19,14 @@ use glam::{DVec3, Vec3};
 
 use crate::support::{
     self,
+    replicates::{film_mean, mean_and_error},
     scenes::{self, diffuse},
-    statistics::{Estimate, estimates},
 };
 
 fn render(scene: &Scene, settings: Settings, samples: u32) -> Sums {
     let (sums, totals) = support::render(scene, settings, samples);
     assert_eq!(totals.dropped_samples, 0);
     sums
-}
-
-fn image_mean(sums: &Sums) -> DVec3 {
-    (0..sums.pixel_count()).map(|pixel| DVec3::from(sums.mean(pixel))).sum::<DVec3>()
-        / sums.pixel_count() as f64
-}
-
-/// Estimates the image's mean and its standard error, per channel, from independent renders.
-fn mean_and_error(scene: &Scene, settings: &Settings, samples: u32, seeds: u32) -> [DVec3; 2] {
-    let mut renderer = support::renderer(scene, settings.clone());
-    let means: Vec<Vec<f64>> = (0..seeds)
-        .map(|seed| {
-            renderer.restart(seed).unwrap();
-            renderer.render_pass(samples).unwrap();
-            image_mean(&renderer.sums().unwrap()).to_array().to_vec()
-        })
-        .collect();
-    support::assert_silent();
-    let channels = estimates(&means);
-    [|channel: &Estimate| channel.mean, Estimate::error]
-        .map(|part| DVec3::from_array([0, 1, 2].map(|index| part(&channels[index]))))
 }
 
 #[test]
@@ -405,7 +384,7 @@ fn a_concave_white_body_vanishes_in_the_furnace() {
     let settings = Settings { depth: 24, roulette: Roulette::NEVER, ..Settings::default() };
     for sampler in [Sampler::Cosine, Sampler::Mis, Sampler::Ris] {
         let sums = render(&scene, Settings { sampler, ..settings.clone() }, 64);
-        let mean = image_mean(&sums);
+        let mean = film_mean(&sums);
         // The crevice between sphere and box holds a little light beyond 24 vertices.
         assert!((mean - 1.0).abs().max_element() < 4e-3, "{}: {mean}", sampler.name());
         for pixel in 0..sums.pixel_count() {
@@ -414,7 +393,7 @@ fn a_concave_white_body_vanishes_in_the_furnace() {
         }
     }
     // With direct light alone the crevice is dark, so the test above depends on bounces.
-    let direct = image_mean(&render(&scene, Settings::default(), 64));
+    let direct = film_mean(&render(&scene, Settings::default(), 64));
     assert!(direct.x < 0.99, "{direct}");
 }
 
@@ -436,7 +415,7 @@ fn roulette_keeps_the_mean() {
     let roulette = Roulette { vertex: 2, throughput: 1.0 };
     for (roulette, samples, tolerance) in [(Roulette::NEVER, 1, 1e-5), (roulette, 1024, 0.02)] {
         let settings = Settings { depth, roulette, ..Settings::default() };
-        let mean = image_mean(&render(&scene, settings, samples));
+        let mean = film_mean(&render(&scene, settings, samples));
         let off = (mean / expected - 1.0).abs().max_element();
         eprintln!("{roulette:?}: off by {off:.5}");
         assert!(off < tolerance, "{roulette:?}: {mean}, not {expected}");
@@ -497,7 +476,7 @@ fn million_samples_keep_the_mean(sampler: Sampler) {
         let pixels = sums.pixel_count();
         let variance: DVec3 =
             (0..pixels).map(|pixel| DVec3::from(sums.variance_of_mean(pixel))).sum();
-        (image_mean(&sums), variance / (pixels * pixels) as f64)
+        (film_mean(&sums), variance / (pixels * pixels) as f64)
     };
     let (expected, expected_variance) = mean_and_variance(Sampler::Cosine, 0);
     let (mean, variance) = mean_and_variance(sampler, 1);

@@ -55,12 +55,7 @@ const WITHOUT_LEARNING: [Sampler; 6] = [
 ];
 
 fn render(settings: Settings, passes: &[u32]) -> Sums {
-    let mut renderer = renderer(&scene(), settings);
-    for samples in passes {
-        renderer.render_pass(*samples).unwrap();
-    }
-    support::assert_silent();
-    renderer.sums().unwrap()
+    support::render_passes(&scene(), settings, passes)
 }
 
 #[test]
@@ -84,11 +79,7 @@ fn a_full_table_of_missing_cells_gives_the_same_bits() {
     small.parameters.guided.guide_memory = 256 * 24 * 20;
     let mut scene = scene();
     (scene.film.width, scene.film.height) = (128, 96);
-    let render = || {
-        let mut renderer = renderer(&scene, small.clone());
-        renderer.render_pass(4).unwrap();
-        renderer.sums().unwrap()
-    };
+    let render = || support::render_passes(&scene, small.clone(), &[4]);
     let first = render();
     for repetition in 1..4 {
         assert!(first == render(), "repetition {repetition} differs");
@@ -149,9 +140,7 @@ fn a_film_may_have_more_pixels_than_a_dispatch() {
         // Other layers would divide the film into pages.
         let aovs = Vec::new();
         let one_page = Settings { window, depth: 1, aovs, ..settings(Sampler::Mis) };
-        let mut renderer = renderer(&scene, one_page);
-        renderer.render_pass(1).unwrap();
-        renderer.sums().unwrap()
+        support::render_passes(&scene, one_page, &[1])
     };
     let whole = sums(None);
     let [x, y] = [width - 24, height - 16];
@@ -307,11 +296,7 @@ fn lists_of_living_paths_make_no_difference() {
         settings.roulette = Roulette { vertex: 1, throughput: 0.5 };
         settings.parameters.set(&format!("share-paths={sharing}")).unwrap();
         let sums = |path_lists| {
-            let mut renderer = renderer(&scene, Settings { path_lists, ..settings.clone() });
-            renderer.render_pass(2).unwrap();
-            renderer.render_pass(6).unwrap();
-            support::assert_silent();
-            renderer.sums().unwrap()
+            support::render_passes(&scene, Settings { path_lists, ..settings.clone() }, &[2, 6])
         };
         let all = sums(PathLists::Never);
         assert!(sums(PathLists::Always) == all, "{} {sharing} differs", sampler.name());

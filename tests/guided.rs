@@ -26,9 +26,9 @@ use glam::Vec3;
 use crate::support::{
     self, assert_error,
     guide::Guide as _,
-    replicates::{BLOCK, LIMIT, REPLICATES, replicates, rows},
+    replicates::{BLOCK, REPLICATES, assert_near, assert_same, replicates, rows},
     scenes,
-    statistics::{Comparison, estimates, z_of_mean},
+    statistics::{estimates, z_of_mean},
 };
 
 const FIRST_SEED: u32 = 7000;
@@ -53,15 +53,7 @@ fn agree(scene: &Scene, depth: u32, samples: u32, modes: &[(&str, Settings)]) {
     for (name, settings) in modes {
         let settings = Settings { depth, ..settings.clone() };
         let values = replicates(scene, &settings, FIRST_SEED, samples);
-        let Comparison { largest_t, ratio, largest_t_with_bias } =
-            Comparison::new(&values, &reference);
-        eprintln!("{} {name}: largest |t| {largest_t:.2}, ratio {ratio:.4}", scene.name);
-        assert!(largest_t < LIMIT, "{} {name}: |t| = {largest_t}", scene.name);
-        assert!(
-            largest_t_with_bias > LIMIT || (ratio - 1.0).abs() < 0.02,
-            "{} {name}: too noisy to judge",
-            scene.name
-        );
+        assert_same(&format!("{} {name}", scene.name), &values, &reference, 0.02);
     }
 }
 
@@ -137,10 +129,7 @@ fn places_that_share_a_key_are_unbiased() {
         };
         let seeds = FIRST_SEED..FIRST_SEED + REPLICATES;
         let values = estimates(&rows(&scene, &settings, seeds, samples, BLOCK, prepare));
-        let Comparison { largest_t, ratio, .. } = Comparison::new(&values, &reference);
-        eprintln!("{name}, {candidates}: largest |t| {largest_t:.2}, ratio {ratio:.4}");
-        assert!(largest_t < LIMIT, "{name}, {candidates} candidates: |t| = {largest_t}");
-        assert!((ratio - 1.0).abs() < 0.05, "{name}, {candidates} candidates: {ratio}");
+        assert_near(&format!("{name}, {candidates} candidates"), &values, &reference, 0.05);
 
         // Check that keys are shared, or not, as the name says.
         let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();

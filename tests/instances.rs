@@ -28,7 +28,7 @@ use crate::{
         self, assert_error,
         random::Random,
         rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, soup, sphere},
-        replicates::{assert_same, replicates},
+        replicates::{assert_same, film_mean, replicates},
         scenes,
     },
     twin::surface::{surface_at, triangle_material},
@@ -565,8 +565,7 @@ fn rays_go_through_each_of_several_sheets() {
     {
         scene.camera.position.y = height;
         let (sums, _) = support::render(&scene, settings.clone(), samples);
-        let pixels = sums.pixel_count();
-        let mean = (0..pixels).map(|pixel| sums.mean(pixel)[0]).sum::<f64>() / pixels as f64;
+        let mean = film_mean(&sums).x;
         eprintln!("from {height} m: {mean:.5}, expected {expected:.5}");
         assert!((mean / expected - 1.0).abs() < tolerance, "from {height} m: {mean}");
     }

@@ -5,7 +5,6 @@
 use std::{f32::consts::PI, sync::Arc};
 
 use fenestra::{
-    film::Sums,
     sampler::Sampler,
     scene::{
         Geometry, Lamp, Scene,
@@ -17,44 +16,24 @@ use fenestra::{
 };
 use glam::{DVec3, Vec3};
 
-use crate::support::{self, scenes};
+use crate::support::{
+    self,
+    replicates::{film_mean, mean_and_error},
+    scenes,
+};
 
 /// Mean of the red channel over the film, where no noise is expected.
 fn mean(scene: &Scene, settings: Settings) -> f64 {
     let (sums, totals) = support::render(scene, settings, 4);
     assert_eq!((totals.dropped_samples, totals.traversal_overruns), (0, 0));
-    mean_of(&sums)
+    film_mean(&sums).x
 }
 
-fn mean_of(sums: &Sums) -> f64 {
-    let pixels = sums.pixel_count();
-    (0..pixels).map(|pixel| sums.mean(pixel)[0]).sum::<f64>() / pixels as f64
-}
-
-/// Mean of the red channel over the film and its standard error, from renders of eight seeds.
-fn mean_and_error(scene: &Scene, settings: Settings, samples: u32) -> (f64, f64) {
-    const SEEDS: u32 = 8;
-    let mut renderer = support::renderer(scene, settings);
-    let means: Vec<f64> = (0..SEEDS)
-        .map(|seed| {
-            renderer.restart(seed).unwrap();
-            renderer.render_pass(samples).unwrap();
-            let totals = renderer.totals();
-            assert_eq!((totals.dropped_samples, totals.traversal_overruns), (0, 0));
-            mean_of(&renderer.sums().unwrap())
-        })
-        .collect();
-    support::assert_silent();
-    let mean = means.iter().sum::<f64>() / means.len() as f64;
-    let squares: f64 = means.iter().map(|value| (value - mean).powi(2)).sum();
-    let count = means.len() as f64;
-    (mean, (squares / (count * (count - 1.0))).sqrt())
-}
-
-/// Checks the mean of the image within six standard errors and 0.05%, at a relative error below 1%.
+/// Checks the red of the image's mean within six standard errors and 0.05%, at a relative error below 1%, by
+/// renders of eight seeds.
 fn assert_mean(scene: &Scene, settings: Settings, samples: u32, expected: f64) {
     let name = format!("{} {} depth {}", scene.name, settings.sampler.name(), settings.depth);
-    let (mean, error) = mean_and_error(scene, settings, samples);
+    let [mean, error] = mean_and_error(scene, &settings, samples, 8).map(|value| value.x);
     eprintln!("{name}: {mean:.5} ± {error:.5}, expected {expected:.5}");
     assert!(error < 0.01 * expected, "{name}: too noisy to judge");
     assert!((mean - expected).abs() < 6.0 * error + 5e-4 * expected, "{name}");
@@ -128,9 +107,7 @@ fn assert_channels_at(
     expected: impl Fn(f64) -> DVec3,
 ) {
     let (sums, _) = support::render(scene, settings(Sampler::Mis, depth), samples);
-    let pixels = sums.pixel_count();
-    let mean =
-        (0..pixels).map(|pixel| DVec3::from(sums.mean(pixel))).sum::<DVec3>() / pixels as f64;
+    let mean = film_mean(&sums);
     let of = |channel: usize| {
         mean_over_plane(scene, |place| {
             let cosine = (scene.camera.position - place).normalize().y.abs();

@@ -11,9 +11,9 @@ use glam::Vec3;
 
 use crate::support::{
     self, assert_error,
-    replicates::{BLOCK, LIMIT, REPLICATES, block_means, rows},
+    replicates::{BLOCK, REPLICATES, assert_near, block_means, rows},
     scenes,
-    statistics::{Comparison, estimates},
+    statistics::estimates,
 };
 
 /// Returns settings with groups of lights, without what is measured from run to run.
@@ -116,10 +116,7 @@ fn a_group_is_the_picture_of_its_lights_alone() {
     let plain = Settings { aovs: Vec::new(), ..settings };
     for (rows_of_group, name) in groups.iter().zip(["key", "lamps"]) {
         let own = rows(&alone(&scene, name), &plain, 100..100 + REPLICATES, 24, BLOCK, |_| {});
-        let compared = Comparison::new(&estimates(rows_of_group), &estimates(&own));
-        eprintln!("{name}: {compared:?}");
-        let Comparison { largest_t, ratio, .. } = compared;
-        assert!(largest_t < LIMIT && (ratio - 1.0).abs() < 0.1, "{name}: {compared:?}");
+        assert_near(name, &estimates(rows_of_group), &estimates(&own), 0.1);
     }
 }
 

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use fenestra::{
-    film::{Sums, Window},
+    film::Window,
     pass::Roulette,
     sampler::Sampler,
     scene::{
@@ -23,6 +23,7 @@ use glam::Vec3;
 use crate::support::{
     self, materials,
     rays::scaled,
+    render_passes as render,
     replicates::{self, REPLICATES},
     scenes,
     statistics::{Comparison, estimates, largest_t},
@@ -171,8 +172,7 @@ fn a_concave_white_body_vanishes_in_the_furnace() {
         let settings = settings(Sampler::Cosine, edge, 24);
         let settings = Settings { roulette: Roulette::NEVER, ..settings };
         let (sums, _) = support::render(scene, settings, 64);
-        let pixels = sums.pixel_count();
-        (0..pixels).map(|pixel| sums.mean(pixel)[1]).sum::<f64>() / pixels as f64
+        replicates::film_mean(&sums).y
     };
     let shared = mean(&scene, "4");
     assert!((shared - 1.0).abs() < 4e-3, "{shared}");
@@ -180,15 +180,6 @@ fn a_concave_white_body_vanishes_in_the_furnace() {
     let (alone, shared) = (mean(&scene, "off"), mean(&scene, "4"));
     eprintln!("measured: {alone} alone, {shared} shared");
     assert!((shared - alone).abs() < 1e-3 && alone > 0.98, "{alone}, {shared}");
-}
-
-fn render(scene: &Scene, settings: Settings, passes: &[u32]) -> Sums {
-    let mut renderer = support::renderer(scene, settings);
-    for samples in passes {
-        renderer.render_pass(*samples).unwrap();
-    }
-    support::assert_silent();
-    renderer.sums().unwrap()
 }
 
 #[test]
@@ -349,8 +340,8 @@ fn films_of_odd_sizes_and_crop_windows_have_the_same_mean() {
     let mean = |scene: &Scene, settings: Settings| {
         let sums = render(scene, settings, &[1024]);
         let pixels = sums.pixel_count();
-        let of = |value: &dyn Fn(usize) -> f64| (0..pixels).map(value).sum::<f64>() / pixels as f64;
-        (of(&|pixel| sums.mean(pixel)[1]), of(&|pixel| sums.variance_of_mean(pixel)[1]).sqrt())
+        let variance: f64 = (0..pixels).map(|pixel| sums.variance_of_mean(pixel)[1]).sum();
+        (replicates::film_mean(&sums).y, (variance / pixels as f64).sqrt())
     };
     let window = Window { x: 5, y: 3, width: 9, height: 13 };
     for (size, window) in [([3, 2], None), ([13, 9], None), ([32, 24], Some(window))] {

@@ -124,6 +124,14 @@ pub fn render(scene: &Scene, settings: Settings, samples: u32) -> (Sums, Totals)
     (renderer.sums().unwrap(), renderer.totals().clone())
 }
 
+/// Renders passes of as many samples per pixel as `passes` says and returns the sums.
+pub fn render_passes(scene: &Scene, settings: Settings, passes: &[u32]) -> Sums {
+    let mut renderer = renderer(scene, settings);
+    passes.iter().for_each(|samples| renderer.render_pass(*samples).unwrap());
+    assert_silent();
+    renderer.sums().unwrap()
+}
+
 /// Fails if the validation layers have said anything since the device was opened.
 pub fn assert_silent() {
     let messages = device().validation_messages();

@@ -7,6 +7,7 @@ use fenestra::{
     scene::Scene,
     session::{Renderer, Settings},
 };
+use glam::DVec3;
 
 use super::statistics::{Comparison, Estimate, estimates};
 
@@ -67,6 +68,36 @@ pub fn replicates(
 ) -> Vec<Estimate> {
     let seeds = first_seed..first_seed + REPLICATES;
     estimates(&rows(scene, settings, seeds, samples, BLOCK, |_| {}))
+}
+
+/// Averages the radiance of the film.
+pub fn film_mean(sums: &Sums) -> DVec3 {
+    let pixels = 0..sums.pixel_count();
+    pixels.map(|pixel| DVec3::from(sums.mean(pixel))).sum::<DVec3>() / sums.pixel_count() as f64
+}
+
+/// Estimates the film's mean and its standard error from pictures with the seeds 0 to `seeds` − 1.
+pub fn mean_and_error(scene: &Scene, settings: &Settings, samples: u32, seeds: u32) -> [DVec3; 2] {
+    let mut renderer = super::renderer(scene, settings.clone());
+    let mean = |seed| {
+        renderer.restart(seed).unwrap();
+        renderer.render_pass(samples).unwrap();
+        let totals = renderer.totals();
+        assert_eq!((totals.dropped_samples, totals.traversal_overruns), (0, 0));
+        film_mean(&renderer.sums().unwrap()).to_array().to_vec()
+    };
+    let channels = estimates(&(0..seeds).map(mean).collect::<Vec<_>>());
+    super::assert_silent();
+    [|channel: &Estimate| channel.mean, Estimate::error]
+        .map(|part| DVec3::from_array([0, 1, 2].map(|index| part(&channels[index]))))
+}
+
+/// Fails if estimates differ from those of a reference, or their sums by `tolerance` of the reference's.
+pub fn assert_near(name: &str, values: &[Estimate], reference: &[Estimate], tolerance: f64) {
+    let compared = Comparison::new(values, reference);
+    eprintln!("{name}: {compared:?}");
+    assert!(compared.largest_t < LIMIT, "{name}: {compared:?}");
+    assert!((compared.ratio - 1.0).abs() < tolerance, "{name}: {compared:?}");
 }
 
 /// Fails if estimates differ from those of a reference, or if too much noise hides an error of a tenth and
