@@ -5,7 +5,7 @@
 use std::{collections::BTreeMap, fs};
 
 use fenestra::{
-    film::{Attribute, Image, Statistics, Sums},
+    film::{Attribute, Statistics, Sums},
     sampler::{
         Parameters, Sampler,
         guided::{Arm, GuideState, cost::ArmCost},
@@ -217,13 +217,8 @@ fn files_and_figures_tell_the_arm() {
         let arguments = [&["render", &scene, "-o", output][..], &fixed, options].concat();
         let run = folder.run(&arguments);
         run.assert(0, &[]);
-        let text = fs::read_to_string(folder.path().join("stats.json")).unwrap();
-        let statistics: Statistics = serde_json::from_str(&text).unwrap();
-        (
-            run.output + &run.messages,
-            Image::read_exr(&folder.path().join(output)).unwrap(),
-            statistics,
-        )
+        let statistics: Statistics = folder.json("stats.json");
+        (run.output + &run.messages, folder.image(output), statistics)
     };
     let keep = ["--spp", "3", "--save-guide", "room.guide"];
     let (output, image, statistics) = render("a.exr", &keep);

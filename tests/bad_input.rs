@@ -19,7 +19,7 @@ use glam::Vec3;
 
 use crate::support::{
     self, c_library,
-    command::{Folder, Run, Running, program},
+    command::{Folder, Run, Running, prepare, program},
 };
 
 /// One quad, `quad.ply`, under a constant environment. Each case changes a part of it.
@@ -93,7 +93,7 @@ fn assert_refused(folder: &Folder, parts: &[&str]) {
 #[track_caller]
 fn assert_renders(folder: &Folder, warnings: &[&str]) -> Image {
     folder.run(&RENDER).assert(0, warnings);
-    let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+    let image = folder.image("out.exr");
     for (name, samples) in &image.channels {
         assert!(samples.iter().all(|sample| sample.is_finite()), "channel {name} is finite");
     }
@@ -377,7 +377,7 @@ fn an_interrupt_writes_what_there_is() {
     // The program names the device once it listens for interrupts.
     let run = Running::start(folder.path(), &options, "device: ").interrupt();
     run.assert(130, &["interrupted"]);
-    let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+    let image = folder.image("out.exr");
     let samples = &image.attributes["samplesPerPixel"];
     assert!(matches!(samples, Attribute::Integer(1..100_000_000)), "{samples:?}");
     assert!(image.channels["R"].iter().all(|sample| sample.is_finite() && *sample > 0.0));
@@ -386,15 +386,9 @@ fn an_interrupt_writes_what_there_is() {
 /// Runs the program with a limit of a minute, after which the status is 124.
 #[cfg(unix)]
 fn run_limited(folder: &Folder, arguments: &[&str]) -> Run {
-    let rendering = program(folder.path());
     let mut limited = Command::new("timeout");
-    limited.arg("60").arg(rendering.get_program()).args(arguments).current_dir(folder.path());
-    for (name, value) in rendering.get_envs() {
-        match value {
-            Some(value) => limited.env(name, value),
-            None => limited.env_remove(name),
-        };
-    }
+    prepare(&mut limited, folder.path());
+    limited.args(["60", env!("CARGO_BIN_EXE_fenestra")]).args(arguments);
     Run::of(&limited.output().unwrap())
 }
 
@@ -448,7 +442,7 @@ fn an_output_is_a_file_a_device_or_standard_output() {
     let output = program(folder.path()).args(arguments).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     folder.write("piped.exr", output.stdout);
-    let image = Image::read_exr(&folder.path().join("piped.exr")).unwrap();
+    let image = folder.image("piped.exr");
     assert_eq!([image.width, image.height], [16, 12]);
     let run = folder.run(&[&arguments[..], &["--png"]].concat());
     run.assert(2, &["--png needs a file beside --output", "/dev/stdout"]);
@@ -651,9 +645,8 @@ fn less_memory_makes_smaller_waves_and_the_same_picture() {
     let render = |limit: &str| {
         let options = [&RENDER[..], &[limit, "--sampler=visibility", "--stats=s.json"]].concat();
         folder.run(&options).assert(0, &[]);
-        let stats: serde_json::Value =
-            serde_json::from_slice(&fs::read(folder.path().join("s.json")).unwrap()).unwrap();
-        let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        let stats: serde_json::Value = folder.json("s.json");
+        let image = folder.image("out.exr");
         (stats["buffer_bytes"]["shadow rays"].as_u64().unwrap(), image.channels)
     };
     let (bytes, picture) = render("--max-memory=4G");
@@ -738,7 +731,7 @@ fn a_conductor_that_reflects_nothing_is_never_negative() {
     );
     for sampler in ["brdf", "mis", "product", "guided"] {
         folder.run(&[&RENDER[..], &["--sampler", sampler]].concat()).assert(0, &[]);
-        let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        let image = folder.image("out.exr");
         for name in ["R", "G", "B"] {
             let least = image.channels[name].iter().copied().fold(f32::INFINITY, f32::min);
             assert!(least >= 0.0, "{sampler}: {least} in {name}");

@@ -3,43 +3,15 @@
 
 use crate::support::command::Folder;
 
-const SCENE: &str = r#"
-[camera]
-position = [0.0, 1.0, 4.0]
-look_at = [0.0, 0.0, 0.0]
-vertical_fov_deg = 45.0
-
-[film]
-width = 61
-height = 47
-
-[environment]
-constant = [1, 1, 1]
-
-[[material]]
-name = "grey"
-type = "diffuse"
-reflectance = [0.5, 0.5, 0.5]
-
-[[object]]
-name = "box"
-shape = "box"
-size = [1.0, 1.0, 1.0]
-material = "grey"
-
-[[object]]
-name = "floor"
-shape = "box"
-size = [6.0, 0.2, 6.0]
-material = "grey"
-translate = [0.0, -0.6, 0.0]
-"#;
+fn folder() -> Folder {
+    let object = "shape = \"box\"\nsize = [1.0, 1.0, 1.0]\ntranslate = [0.0, 0.5, 0.0]";
+    Folder::with_yard([61, 47], object)
+}
 
 #[test]
 fn every_figure_is_there() {
-    let folder = Folder::new();
-    folder.write("two_boxes.toml", SCENE);
-    let run = folder.run(&["bench", "two_boxes.toml", "--repetitions", "2", "--json"]);
+    let folder = folder();
+    let run = folder.run(&["bench", "scene.toml", "--repetitions", "2", "--json"]);
     run.assert(0, &[]);
     let report: serde_json::Value = serde_json::from_str(&run.output).unwrap();
     assert_eq!(report["triangles"], 24);
@@ -64,22 +36,18 @@ fn every_figure_is_there() {
     assert_eq!(report["buffer_bytes"]["triangles 0"], 24 * 48);
     assert!(report["shadow_pass_share"]["median"].as_f64().unwrap() < 1.0);
 
-    let options = ["bench", "two_boxes.toml", "--repetitions=1", "--sampler=guided", "--depth=2"];
+    let options = ["bench", "scene.toml", "--repetitions=1", "--sampler=guided", "--depth=2"];
     let text = folder.run(&options);
-    text.assert(0, &[]);
-    for part in ["ratio", "triangles 0", "2 vertices: ", "bounce_guided "] {
-        assert!(text.output.contains(part), "{part}: {}", text.output);
-    }
+    text.assert_output(&["ratio", "triangles 0", "2 vertices: ", "bounce_guided "]);
 }
 
 #[test]
 fn what_cannot_be_measured_is_said() {
-    let folder = Folder::new();
-    folder.write("two_boxes.toml", SCENE);
-    let run = folder.run(&["bench", "two_boxes.toml", "--sampler", "ris"]);
+    let folder = folder();
+    let run = folder.run(&["bench", "scene.toml", "--sampler", "ris"]);
     run.assert(2, &["ris", "mis"]);
     let run = folder.run(&["bench", "nowhere.toml"]);
     run.assert(1, &["nowhere.toml"]);
-    let run = folder.run(&["bench", "two_boxes.toml", "--device", "no such device"]);
+    let run = folder.run(&["bench", "scene.toml", "--device", "no such device"]);
     run.assert(75, &["no such device"]);
 }

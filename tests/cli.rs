@@ -7,7 +7,7 @@ use std::{fs, process::Stdio};
 use fenestra::film::Image;
 
 use crate::support::{
-    command::{self, Folder, Run, program},
+    command::{BALL, Folder, Run, program},
     is_software,
 };
 
@@ -268,7 +268,7 @@ fn kernels_are_compiled_in_other_processes() {
     if !is_software() {
         return;
     }
-    let folder = Folder::new();
+    let folder = Folder::with_yard([64, 48], BALL);
     let cache = folder.path().join("shaders");
     let run = |arguments: &[&str]| {
         let mut command = program(folder.path());
@@ -294,11 +294,9 @@ fn kernels_are_compiled_in_other_processes() {
     assert_eq!(compile(r#"[["deposit", []]]"#), one);
     run(&["compile", "0", r#"[["no_pass", []]]"#]).assert(2, &["no pass is no_pass"]);
 
-    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    folder.write("scene.toml", command::yard([64, 48], command::SKY, clay, command::BALL));
     let picture = |name: &str, messages: &[&str]| {
         run(&["render", "scene.toml", "--spp=1", "-vv", "-o", name]).assert(0, messages);
-        Image::read_exr(&folder.path().join(name)).unwrap().channels
+        folder.image(name).channels
     };
     // The cache lacks most kernels of the first picture, and none of the second.
     let cold = picture("cold.exr", &["processes that compile ahead: "]);

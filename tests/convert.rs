@@ -68,7 +68,7 @@ fn images_keep_their_values() {
     let run = |arguments: &[&str]| {
         folder.run(&[&["convert", "in.exr"], arguments].concat()).assert(0, &[])
     };
-    let read = |name: &str| Image::read_exr(&folder.path().join(name)).unwrap();
+    let read = |name: &str| folder.image(name);
     run(&["same.exr"]);
     assert_eq!(read("same.exr"), read("in.exr"));
     run(&["part.exr", "--crop", "2,1,5,3"]);

@@ -64,10 +64,6 @@ fn moments(image: &Image) -> (f64, f64) {
     (mean, squares / red.len() as f64)
 }
 
-fn read(folder: &Folder, name: &str) -> Image {
-    Image::read_exr(&folder.path().join(name)).unwrap()
-}
-
 fn mark(image: &Image) -> &str {
     match &image.attributes["fenestra.denoised"] {
         Attribute::Text(text) => text,
@@ -83,7 +79,7 @@ fn becomes_smooth(library: &Path, version: &str) {
     let bytes = fs::read(folder.path().join("in.exr")).unwrap();
     let result = run(&folder, library, &["convert", "in.exr", "out.exr", "--denoise"]);
     result.assert(0, &["Open Image Denoise", "with Albedo, N", "biased"]);
-    let denoised = read(&folder, "out.exr");
+    let denoised = folder.image("out.exr");
     let (before, after) = (moments(&film), moments(&denoised));
     assert!(after.1 < 0.3 * before.1, "variance {} of {}", after.1, before.1);
     assert!((after.0 / before.0 - 1.0).abs() < 0.05, "mean {} of {}", after.0, before.0);
@@ -119,12 +115,12 @@ fn pictures_are_denoised_before_they_are_cut_or_scaled() {
     };
     convert(&["all.exr"]);
     convert(&["part.exr", "--crop", "8,8,12,10"]);
-    let all = read(&folder, "all.exr");
-    let part = read(&folder, "part.exr");
+    let all = folder.image("all.exr");
+    let part = folder.image("part.exr");
     assert_eq!((part.origin, part.width, part.height), ([8, 8], 4, 2));
     assert_eq!(part.channels["G"][0], all.channels["G"][(8 * WIDTH + 8) as usize]);
     convert(&["scaled.exr", "--exposure", "1"]);
-    let scaled = read(&folder, "scaled.exr");
+    let scaled = folder.image("scaled.exr");
     assert_eq!(scaled.channels["B"][5], 2.0 * all.channels["B"][5]);
     assert_eq!(mark(&scaled), mark(&all));
     convert(&["shown.png"]);
@@ -143,7 +139,7 @@ fn bad_pixels_and_missing_layers_are_named() {
     film.write_exr(&folder.path().join("in.exr")).unwrap();
     let result = run(&folder, &library, &["convert", "in.exr", "out.exr", "--denoise"]);
     result.assert(0, &["2 pixels are not finite", "lacks the layers Albedo and N"]);
-    let denoised = read(&folder, "out.exr");
+    let denoised = folder.image("out.exr");
     assert!(denoised.channels.values().flatten().all(|value| (0.15..0.45).contains(value)));
     assert_eq!(mark(&denoised), "Open Image Denoise 2.3.1");
     let mut depth = Image::new(2, 2);
@@ -253,7 +249,7 @@ fn a_render_keeps_its_film() {
     let result = render(&["-o", "film.exr", "--denoise", "--png"]);
     result.assert(0, &["biased", "wrote film.exr, film.png, film.denoised.exr, film.denoised.png"]);
     let [plain, film, denoised] =
-        ["plain.exr", "film.exr", "film.denoised.exr"].map(|name| read(&folder, name));
+        ["plain.exr", "film.exr", "film.denoised.exr"].map(|name| folder.image(name));
     for channel in ["R", "G", "B"] {
         assert_eq!(film.channels[channel], plain.channels[channel]);
     }

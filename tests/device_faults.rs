@@ -3,23 +3,17 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use std::{
-    fs,
-    process::{Command, Output},
-};
+use std::{fs, process::Command};
 
-use fenestra::film::{Checkpoint, Image, checkpoint::remove_checkpoint};
+use fenestra::film::{Checkpoint, checkpoint::remove_checkpoint};
 
 use crate::support::{
-    command::{self, Folder, Run, program},
+    command::{BALL, Folder, Run, program},
     faulty_layer,
 };
 
 fn folder() -> Folder {
-    let folder = Folder::new();
-    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    folder.write("scene.toml", command::yard([64, 48], command::SKY, clay, command::BALL));
-    folder
+    Folder::with_yard([64, 48], BALL)
 }
 
 /// Renders with the layer; `faults` are its variables.
@@ -27,8 +21,7 @@ fn render(folder: &Folder, faults: &[(&str, u64)], options: &[&str]) -> Run {
     let mut command = program(folder.path());
     faulty_layer::insert(&mut command, faults);
     command.args(["render", "scene.toml", "-o", "out.exr"]).args(options);
-    let output: Output = command.output().unwrap();
-    Run::of(&output)
+    Run::of(&command.output().unwrap())
 }
 
 /// The first use of a device tests it, and only a driver that passes is remembered.
@@ -73,7 +66,7 @@ fn a_driver_that_computes_wrong_or_crashes_is_refused() {
 fn a_lost_device_ends_in_one_message_and_keeps_the_checkpoint() {
     let folder = folder();
     let path = folder.path().join("out.checkpoint.exr");
-    let picture = || Image::read_exr(&folder.path().join("out.exr")).unwrap().channels;
+    let picture = || folder.image("out.exr").channels;
     let mut kept = 0;
     for sampler in ["--sampler=mis", "--sampler=guided"] {
         // The first is an upload; the last comes some samples after the first checkpoint.
@@ -105,7 +98,7 @@ fn a_lost_device_ends_in_one_message_and_keeps_the_checkpoint() {
 fn waits_that_end_early_are_repeated_before_a_pass_is_given_up() {
     let folder = folder();
     let options = ["-q", "--sampler=mis", "--spp=2"];
-    let picture = || Image::read_exr(&folder.path().join("out.exr")).unwrap().channels;
+    let picture = || folder.image("out.exr").channels;
     render(&folder, &[], &options).assert(0, &[]);
     let expected = picture();
     render(&folder, &[("FAULTY_WAITS", 119)], &options).assert(0, &[]);
@@ -131,13 +124,13 @@ fn a_device_out_of_memory_takes_smaller_waves_before_it_refuses() {
     let folder = folder();
     let options = ["-q", "--sampler=mis", "--spp=2"];
     render(&folder, &[], &options).assert(0, &[]);
-    let picture = Image::read_exr(&folder.path().join("out.exr")).unwrap().channels;
+    let picture = folder.image("out.exr").channels;
     let (mut refused, mut smaller) = (0, 0);
     for megabytes in [0, 30, 60, 75, 90, 105, 300] {
         let run = render(&folder, &[("FAULTY_BYTES", megabytes << 20)], &options);
         let is_smaller = run.messages.contains(" paths at a time");
         if run.status == Some(0) {
-            let same = Image::read_exr(&folder.path().join("out.exr")).unwrap().channels;
+            let same = folder.image("out.exr").channels;
             assert!(same == picture, "{megabytes} MiB");
             smaller += u32::from(is_smaller);
         } else {

@@ -149,7 +149,7 @@ fn a_short_render_shows_its_last_film_and_layers() {
         folder.run(&[&arguments[..], &more[..]].concat()).assert(0, &[]);
         let shown = server.join().unwrap();
         assert_eq!(shown.name, format!("out.exr ({sampler})"));
-        let written = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        let written = folder.image("out.exr");
         assert_eq!(shown.channels[..4], ["R", "G", "B", "Albedo.B"]);
         assert_eq!(shown.channels.len(), written.channels.len());
         for (name, samples) in shown.channels.iter().zip(&shown.samples) {

@@ -20,7 +20,7 @@ use fenestra::{
 use glam::{Vec2, Vec3};
 
 use crate::{
-    support::command::{BALL, Folder, yard},
+    support::command::{BALL, Folder, assert_parts, yard},
     twin::texture::texture_value,
 };
 
@@ -38,14 +38,6 @@ fn exported(environment: &str, clay: &str, options: &[&str]) -> (Folder, String,
     assert_eq!(run.output, "out/scene.xml\n");
     let xml = fs::read_to_string(folder.path().join("out/scene.xml")).unwrap();
     (folder, xml, run.messages)
-}
-
-/// Fails unless `xml` holds all of `parts`.
-#[track_caller]
-fn assert_parts(xml: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(xml.contains(part), "expected {part} in:\n{xml}");
-    }
 }
 
 /// Returns the header of a PLY file and the number of bytes after it.
@@ -146,7 +138,7 @@ fn the_environment_is_the_same_in_every_direction() {
     let (folder, xml, _) = exported(sky, DIFFUSE, &[]);
     assert_parts(&xml, &["<rotate y=\"1\" angle=\"210"]);
     let scene = Scene::load(&folder.path().join("scene.toml")).unwrap();
-    let image = Image::read_exr(&folder.path().join("out/scene/environment.exr")).unwrap();
+    let image = folder.image("out/scene/environment.exr");
     assert_eq!([image.width, image.height], [32, 33]);
     let texels = image.triple(["R", "G", "B"]).unwrap();
     let (sine, cosine) = 210.0_f32.to_radians().sin_cos();

@@ -30,9 +30,7 @@ fn task(folder: &Folder, number: u32) -> Child {
 
 #[test]
 fn tasks_of_a_farm_give_the_bits_of_one_process() {
-    let folder = Folder::new();
-    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    folder.write("scene.toml", command::yard([24, 15], command::SKY, clay, command::BALL));
+    let folder = Folder::with_yard([24, 15], command::BALL);
     let mut tasks = [0, 1, 2, 3].map(|number| (number, task(&folder, number)));
     // One is preempted as soon as it has something to lose.
     let checkpoint = folder.path().join("out/band1.seed1.checkpoint.exr");
@@ -40,8 +38,7 @@ fn tasks_of_a_farm_give_the_bits_of_one_process() {
     while !checkpoint.exists() && preempted.try_wait().unwrap().is_none() {
         thread::sleep(Duration::from_millis(1));
     }
-    let kill = format!("kill -TERM {}", preempted.id());
-    Command::new("sh").args(["-c", &kill]).status().unwrap();
+    command::send("TERM", preempted.id());
     for (number, mut child) in tasks {
         let mut status = child.wait().unwrap().code();
         if number == 3 {
@@ -59,7 +56,7 @@ fn tasks_of_a_farm_give_the_bits_of_one_process() {
     }
     let merged = |parts: &[&str], name: &str| {
         folder.run(&[&["merge", "-q", "-o", name], parts].concat()).assert(0, &[]);
-        Image::read_exr(&folder.path().join(name)).unwrap()
+        folder.image(name)
     };
     let names = |band: u32| seeds.map(|seed| format!("out/band{band}.seed{seed}.exr"));
     let parts = [names(0), names(1)].concat();

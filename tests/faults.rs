@@ -22,16 +22,13 @@ use crate::support::{
 };
 
 fn folder() -> Folder {
-    let folder = Folder::new();
-    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    folder.write("scene.toml", command::yard([24, 16], command::SKY, clay, command::BALL));
-    folder
+    Folder::with_yard([24, 16], command::BALL)
 }
 
 const GUIDED: [&str; 6] = ["render", "scene.toml", "-q", "--sampler=guided", "-o", "out.exr"];
 
 fn channels(folder: &Folder, name: &str) -> impl PartialEq + std::fmt::Debug + use<> {
-    Image::read_exr(&folder.path().join(name)).unwrap().channels
+    folder.image(name).channels
 }
 
 fn checkpoint() -> Checkpoint {
@@ -173,7 +170,7 @@ fn a_render_ends_at_the_last_sample_of_its_seed() {
     folder
         .run(&[&options[..], &["--sample-offset=4294967230"]].concat())
         .assert(0, &["stopped at the last sample of the seed"]);
-    let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+    let image = folder.image("out.exr");
     let ranges = Attribute::Text("0:4294967230+65".to_owned());
     assert_eq!(image.attributes["fenestra.sample_ranges"], ranges);
 }
@@ -219,7 +216,7 @@ fn a_failing_checkpoint_does_not_cost_the_image() {
         let run = folder.run(&options);
         run.assert(1, &["out.checkpoint.exr: cannot write", "the next checkpoint tries again"]);
         assert!(run.messages.contains("wrote out.exr, out.png, stats.json"), "{}", run.messages);
-        let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        let image = folder.image("out.exr");
         assert_eq!(image.attributes["samplesPerPixel"], Attribute::Integer(20));
         fs::remove_file(folder.path().join("out.exr")).unwrap();
     }
@@ -267,7 +264,7 @@ fn hangups_and_terminations_are_interrupts() {
         let options = ["render", "scene.toml", "--spp=100000000", "-o", "out.exr"];
         let run = Running::start(folder.path(), &options, "device: ").signal(signal);
         run.assert(130, &["interrupted", "wrote out.exr, out.checkpoint.exr"]);
-        let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+        let image = folder.image("out.exr");
         assert!(image.channels["R"].iter().all(|sample| sample.is_finite()));
         Checkpoint::read(&folder.path().join("out.checkpoint.exr")).unwrap();
     }
@@ -286,7 +283,7 @@ fn an_interrupt_ends_a_render_within_a_sample() {
     let options = [&options[..], &["--spp=1000", "-o", "out.exr"]].concat();
     let run = Running::start(folder.path(), &options, "device: ").signal("TERM");
     run.assert(130, &["interrupted", "wrote out.exr, out.checkpoint.exr"]);
-    let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+    let image = folder.image("out.exr");
     assert!(
         image.channels["R"].iter().all(|value| value.is_finite()) && image.channels["R"][0] > 0.0
     );
@@ -356,8 +353,7 @@ fn a_hangup_whose_message_cannot_be_written_keeps_the_picture() {
             assert!(start.elapsed().as_secs() < 120, "{name}: no checkpoint");
             thread::sleep(Duration::from_millis(20));
         }
-        let id = nix::unistd::Pid::from_raw(child.id().try_into().unwrap());
-        nix::sys::signal::kill(id, nix::sys::signal::Signal::SIGTERM).unwrap();
+        command::send("TERM", child.id());
         assert_eq!(child.wait().unwrap().code(), Some(130), "{name}");
         assert!(folder.path().join("out.exr").exists(), "{name}");
     }

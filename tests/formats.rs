@@ -247,16 +247,14 @@ fn everything_that_an_obj_file_loses_is_named_once() {
 #[test]
 fn a_render_without_light_says_so_and_does_not_count_as_converged() {
     let folder = Folder::new();
-    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    let dark = command::yard([8, 6], "constant = [0, 0, 0]", clay, command::BALL);
+    let dark = command::yard([8, 6], "constant = [0, 0, 0]", command::CLAY, command::BALL);
     folder.write("dark.toml", &dark);
     folder.write("black.pfm", [b"PF\n2 1\n-1.0\n".as_slice(), &[0; 24]].concat());
     let statistics = |options: &[&str]| -> Statistics {
         let options = [&["render", "-o", "a.exr", "--stats", "a.json"][..], options].concat();
         let run = folder.run(&options);
         run.assert(0, &[]);
-        let text = fs::read_to_string(folder.path().join("a.json")).unwrap();
-        let statistics: Statistics = serde_json::from_str(&text).unwrap();
+        let statistics: Statistics = folder.json("a.json");
         let black = "no sample has found any light: the image is black";
         assert_eq!(run.messages.contains(black), !statistics.found_light);
         statistics

@@ -13,18 +13,12 @@ use crate::support::{
 /// A ball under a roof, before a camera that moves for a quarter of a second.
 fn folder() -> Folder {
     let folder = Folder::new();
-    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    let roof = "shape = \"box\"\nsize = [4.0, 0.1, 4.0]\ntranslate = [0.0, 1.2, 0.0]";
-    let objects = format!("{}\nmaterial = \"clay\"\n\n[[object]]\n{roof}", command::BALL);
     let keys = "[[camera.keyframe]]\ntime = 0\n[[camera.keyframe]]\ntime = 0.25\n\
                 position = [1.0, 0.8, 2.5]\n";
-    let scene = command::yard([24, 16], command::SKY, clay, &objects) + keys;
+    let scene =
+        command::yard([24, 16], command::SKY, command::CLAY, &command::roofed_ball()) + keys;
     folder.write("scene.toml", scene);
     folder
-}
-
-fn image(folder: &Folder, name: &str) -> Image {
-    Image::read_exr(&folder.path().join(name)).unwrap()
 }
 
 #[test]
@@ -33,12 +27,12 @@ fn frames_follow_the_camera_and_have_numbers_of_their_own() {
     let options = ["render", "scene.toml", "--fps=8", "--spp=2", "--sampler=mis", "--depth=1"];
     let render = |rest: &[&str]| folder.run(&[&options, rest].concat());
     render(&["--frames=0-2", "-o", "all.##.exr"]).assert(0, &["frame 2 at 0.250 s: all.02.exr"]);
-    let frames = ["all.00.exr", "all.01.exr", "all.02.exr"].map(|name| image(&folder, name));
+    let frames = ["all.00.exr", "all.01.exr", "all.02.exr"].map(|name| folder.image(name));
     assert_eq!(frames[1].attributes["fenestra.time"], FileAttribute::Double(0.125));
     assert!(frames[0].channels != frames[1].channels && frames[1].channels != frames[2].channels);
     // A frame alone is the one of the sequence, as its metadata say.
     render(&["--frames=2", "-o", "alone.#.exr"]).assert(0, &[]);
-    let alone = image(&folder, "alone.2.exr");
+    let alone = folder.image("alone.2.exr");
     assert_eq!(alone.channels, frames[2].channels);
     let of = |image: &Image| {
         let Metadata { scene_hash, sample_ranges, .. } =
@@ -62,10 +56,7 @@ fn a_guide_is_carried_and_finished_frames_are_skipped() {
         ["--spp=2", "--frames=0-2", "-o", "f.#.exr", "--stats", "f.#.json", "--skip-existing"];
     folder.write("f.1.exr", "an image that someone has rendered");
     render(&frames).assert(0, &["f.1.exr is there: skipped"]);
-    let rays = |frame: u32| {
-        let text = fs::read_to_string(folder.path().join(format!("f.{frame}.json"))).unwrap();
-        serde_json::from_str::<Statistics>(&text).unwrap().rays["camera"]
-    };
+    let rays = |frame: u32| folder.json::<Statistics>(&format!("f.{frame}.json")).rays["camera"];
     let picture = 2 * 24 * 16;
     assert!(rays(0) > picture, "the first frame trains");
     assert_eq!(rays(2), picture, "the camera alone moves");
@@ -73,7 +64,7 @@ fn a_guide_is_carried_and_finished_frames_are_skipped() {
     render(&["--frames=1", "--spp=1", "--checkpoint-interval=1h", "-o", "f.#.exr"]).assert(0, &[]);
     render(&frames).assert(0, &["f.0.exr is there", "frame 1 at", "f.2.exr is there"]);
     render(&["--spp=2", "--frames=1", "-o", "whole.#.exr"]).assert(0, &[]);
-    assert_eq!(image(&folder, "f.1.exr").channels, image(&folder, "whole.1.exr").channels);
+    assert_eq!(folder.image("f.1.exr").channels, folder.image("whole.1.exr").channels);
 }
 
 /// Where more than the camera moves, no frame is rendered with what is on the device for the one before.
@@ -94,6 +85,6 @@ fn a_scene_that_moves_is_loaded_for_every_frame() {
     let render = |rest: &[&str]| folder.run(&[&options, rest].concat()).assert(0, &[]);
     render(&["--frames=0-2x2", "-o", "both.#.exr"]);
     render(&["--frames=2", "-o", "alone.#.exr"]);
-    let [both, alone] = ["both.2.exr", "alone.2.exr"].map(|name| image(&folder, name).channels);
+    let [both, alone] = ["both.2.exr", "alone.2.exr"].map(|name| folder.image(name).channels);
     assert_eq!(both, alone);
 }

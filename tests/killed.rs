@@ -10,7 +10,7 @@ use fenestra::film::{Attribute, Checkpoint, Image, checkpoint::guide_paths};
 
 use crate::support::{
     c_library,
-    command::{self, Folder, Run, program},
+    command::{Folder, Run, program, roofed_ball},
 };
 
 /// Choices by measurement would differ from render to render.
@@ -30,14 +30,9 @@ const CHECKPOINT: &str = "out.checkpoint.exr";
 const BEFORE_RENAME: &str = "killed before a file is renamed";
 const BEFORE_REMOVAL: &str = "killed before a file is removed";
 
-/// A folder with a scene and the checkpoint of two samples. A roof hides most of the sky: else `guided`
-/// learns nothing.
+/// A folder with a scene and the checkpoint of two samples.
 fn folder() -> Folder {
-    let folder = Folder::new();
-    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    let roof = "shape = \"box\"\nsize = [4.0, 0.1, 4.0]\ntranslate = [0.0, 1.2, 0.0]";
-    let objects = format!("{}\nmaterial = \"clay\"\n\n[[object]]\n{roof}", command::BALL);
-    folder.write("scene.toml", command::yard([24, 16], command::SKY, clay, &objects));
+    let folder = Folder::with_yard([24, 16], &roofed_ball());
     render(&folder, None, &["--spp=2", "--checkpoint-interval=1h"]).assert(0, &[]);
     folder
 }
@@ -60,7 +55,7 @@ fn samples(folder: &Folder) -> u32 {
 }
 
 fn picture(folder: &Folder) -> Image {
-    Image::read_exr(&folder.path().join(PICTURE)).unwrap()
+    folder.image(PICTURE)
 }
 
 fn assert_no_leftovers(folder: &Folder) {

@@ -2,7 +2,7 @@
 //! sampling does without lobes that cannot be fitted, and biased options say so.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use fenestra::film::{Image, Statistics};
+use fenestra::film::Statistics;
 
 use crate::support::command::{self, Folder};
 
@@ -34,8 +34,7 @@ fn run_to(folder: &Folder, output: &str, spp: &str, options: &[&str]) -> command
 }
 
 fn statistics(folder: &Folder) -> Statistics {
-    let text = std::fs::read_to_string(folder.path().join("stats.json")).unwrap();
-    serde_json::from_str(&text).unwrap()
+    folder.json("stats.json")
 }
 
 #[test]
@@ -90,7 +89,7 @@ fn a_render_with_lobes_continued_from_its_checkpoint_has_the_same_bits() {
         let resume = [&options[..], &["--resume"]].concat();
         run_to(&folder, "out.exr", "5", &resume).assert(0, &[]);
         assert_eq!(statistics(&folder).samples_per_pixel, 5);
-        let channels = |name| Image::read_exr(&folder.path().join(name)).unwrap().channels;
+        let channels = |name| folder.image(name).channels;
         assert_eq!(channels("out.exr"), channels("whole.exr"), "{sampler}");
         // Other lobes make another render.
         let others = [&resume[..], &["--set", "environment-lobes=9"]].concat();
@@ -108,7 +107,7 @@ fn what_cannot_be_fitted_is_done_without() {
             let run = run(&folder, &["--sampler", sampler]);
             run.assert(0, &["sampling does without its lobes"]);
             assert!(run.messages.contains(what), "{what} in {}", run.messages);
-            let image = Image::read_exr(&folder.path().join("out.exr")).unwrap();
+            let image = folder.image("out.exr");
             // The floor fills the lower edge.
             assert_eq!(image.channels["R"].last(), Some(&0.0), "{what}, {sampler}");
             assert_eq!(statistics(&folder).dropped_samples, 0);

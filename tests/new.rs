@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use fenestra::film::Image;
-
 use crate::support::command::Folder;
 
 #[test]
@@ -16,7 +14,7 @@ fn the_first_scene_renders() {
     arguments.extend(["--size=32x24", "--spp=4"]);
     folder.run(&arguments).assert(0, &[]);
     assert_eq!(folder.files(), ["first", "try.exr", "try.png"], "named after its folder");
-    let image = Image::read_exr(&folder.path().join("try.exr")).unwrap();
+    let image = folder.image("try.exr");
     assert_eq!([image.width, image.height], [32, 24]);
     let luminance = &image.channels["G"];
     let mean = luminance.iter().sum::<f32>() / luminance.len() as f32;

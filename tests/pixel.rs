@@ -62,8 +62,7 @@ fn run(folder: &Folder, options: &[&str]) -> command::Run {
 }
 
 fn numbers(folder: &Folder) -> Value {
-    let text = std::fs::read(folder.path().join("out.pixel_12_8.json")).unwrap();
-    serde_json::from_slice(&text).unwrap()
+    folder.json("out.pixel_12_8.json")
 }
 
 fn vector(value: &Value) -> [f64; 3] {

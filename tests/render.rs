@@ -10,16 +10,11 @@ fn render(folder: &Folder, output: &str, options: &[&str]) -> (Image, Statistics
     let mut arguments = vec!["render", "scene.toml", "-o", output, "--stats", "stats.json"];
     arguments.extend(options);
     folder.run(&arguments).assert(0, &[]);
-    let image = Image::read_exr(&folder.path().join(output)).unwrap();
-    let text = std::fs::read_to_string(folder.path().join("stats.json")).unwrap();
-    (image, serde_json::from_str(&text).unwrap())
+    (folder.image(output), folder.json("stats.json"))
 }
 
 fn folder() -> Folder {
-    let folder = Folder::new();
-    let clay = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
-    folder.write("scene.toml", command::yard([40, 24], command::SKY, clay, command::BALL));
-    folder
+    Folder::with_yard([40, 24], command::BALL)
 }
 
 #[test]
@@ -114,7 +109,7 @@ fn a_render_continued_from_its_checkpoint_has_the_same_bits() {
         render(&folder, name, &with(&["--spp", "8", "--sample-offset", offset]));
     }
     folder.run(&["merge", "a.exr", "b.exr", "-o", "ab.exr"]).assert(0, &[]);
-    let merged = Image::read_exr(&folder.path().join("ab.exr")).unwrap();
+    let merged = folder.image("ab.exr");
     let (both, _) = render(&folder, "both.exr", &with(&["--spp", "16"]));
     for (name, values) in both.channels.iter().filter(|(name, _)| name.starts_with("Crypto")) {
         assert_eq!(merged.channels[name], *values, "{name}");
@@ -135,7 +130,7 @@ fn light_groups_of_parts_add_up_to_the_merged_picture() {
         folder.run(&[&options[..], &["--seed", seed, "-o", name]].concat()).assert(0, &[line]);
     }
     folder.run(&["merge", "a.exr", "b.exr", "-o", "ab.exr"]).assert(0, &[]);
-    let merged = Image::read_exr(&folder.path().join("ab.exr")).unwrap();
+    let merged = folder.image("ab.exr");
     for channel in ["R", "G", "B"] {
         let [sky, key] = ["environment", "key"]
             .map(|group| &merged.channels[&format!("Combined_{group}.{channel}")]);

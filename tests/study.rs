@@ -59,8 +59,7 @@ fn all_but<'a>(options: &[&'a str], beginnings: &[&str]) -> Vec<&'a str> {
 }
 
 fn json(folder: &Folder, name: &str) -> Value {
-    let text = fs::read_to_string(folder.path().join("report").join(name)).unwrap();
-    serde_json::from_str(&text).unwrap()
+    folder.json(&format!("report/{name}"))
 }
 
 /// Cuts what lies between two marks, wherever they are.
@@ -602,8 +601,7 @@ fn references_can_be_given() {
     // The error of a single image comes from its variances.
     let one = ["study", "yard.toml", "--samplers=mis", "--spp=2", "--reference=a.exr", "-o", "one"];
     folder.run(&one).assert(0, &[]);
-    let text = fs::read_to_string(folder.path().join("one/results.json")).unwrap();
-    let results: Value = serde_json::from_str(&text).unwrap();
+    let results: Value = folder.json("one/results.json");
     let single = &results["scenes"][0]["reference"];
     assert!(single["mse"].as_f64().unwrap() > own["mse"].as_f64().unwrap());
     // The error of a mean of two is half their difference, and that of its mean less by the root of 2.
@@ -632,8 +630,7 @@ fn references_can_be_given() {
             "more",
         ])
         .assert(0, &[]);
-    let text = fs::read_to_string(folder.path().join("more/results.json")).unwrap();
-    let results: Value = serde_json::from_str(&text).unwrap();
+    let results: Value = folder.json("more/results.json");
     assert_eq!(results["scenes"][0]["reference"]["mean"], own["mean"]);
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use fenestra::{
     accel::Accel,
-    film::{Attribute, Image},
+    film::Attribute,
     gpu::{Device, Tracer},
     pass::Schedule,
     scene::Scene,
@@ -146,7 +146,7 @@ fn host_and_device_draw_the_same_picture() {
 }
 
 fn tracer_of(folder: &Folder) -> String {
-    match &Image::read_exr(&folder.path().join("yard.exr")).unwrap().attributes["fenestra.tracer"] {
+    match &folder.image("yard.exr").attributes["fenestra.tracer"] {
         Attribute::Text(text) => text.clone(),
         other => panic!("expected text, found {other:?}"),
     }

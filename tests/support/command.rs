@@ -4,6 +4,7 @@
 use std::{
     env,
     ffi::OsStr,
+    fs,
     io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
     process::{Child, ChildStderr, Command, Output, Stdio},
@@ -11,6 +12,9 @@ use std::{
     thread,
     time::{Duration, Instant},
 };
+
+use fenestra::film::Image;
+use serde::de::DeserializeOwned;
 
 pub use super::folder::{BALL, Folder, SKY, yard};
 
@@ -54,14 +58,19 @@ impl Run {
         }
     }
 
+    /// Fails unless the run succeeded and its output contains every part of `parts`.
+    #[track_caller]
+    pub fn assert_output(&self, parts: &[&str]) {
+        self.assert(0, &[]);
+        assert_parts(&self.output, parts);
+    }
+
     /// Fails unless the exit status is `status` and the messages contain every part of `parts`.
     #[track_caller]
     pub fn assert(&self, status: i32, parts: &[&str]) {
         let messages = &self.messages;
         assert_eq!(self.status, Some(status), "exit status; messages:\n{messages}");
-        for part in parts {
-            assert!(messages.contains(part), "expected {part:?} in the messages:\n{messages}");
-        }
+        assert_parts(messages, parts);
         assert!(!messages.contains("panicked"), "bad input is no reason to panic:\n{messages}");
     }
 }
@@ -131,12 +140,48 @@ impl Running {
 }
 
 /// Sends a signal by the shell's own `kill`: the program of that name is not on every system.
-fn send(signal: &str, process: u32) {
+pub fn send(signal: &str, process: u32) {
     let kill = format!("kill -{signal} {process}");
     assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
 }
 
+/// Material of a [`yard`].
+pub const CLAY: &str = "type = \"diffuse\"\nreflectance = [0.6, 0.4, 0.3]";
+
+/// Object of a [`yard`]: a ball under a roof that hides most of the sky, else `guided` learns nothing.
+pub fn roofed_ball() -> String {
+    let roof = "shape = \"box\"\nsize = [4.0, 0.1, 4.0]\ntranslate = [0.0, 1.2, 0.0]";
+    format!("{BALL}\nmaterial = \"clay\"\n\n[[object]]\n{roof}")
+}
+
+/// Fails unless `text` holds every part of `parts`.
+#[track_caller]
+pub fn assert_parts(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "expected {part:?} in:\n{text}");
+    }
+}
+
 impl Folder {
+    /// Makes a folder with `scene.toml`, an object of clay under the sky.
+    pub fn with_yard(size: [u32; 2], object: &str) -> Self {
+        let folder = Self::new();
+        folder.write("scene.toml", yard(size, SKY, CLAY, object));
+        folder
+    }
+
+    /// Reads an image of this folder.
+    #[track_caller]
+    pub fn image(&self, name: impl AsRef<Path>) -> Image {
+        Image::read_exr(&self.path().join(name)).unwrap()
+    }
+
+    /// Reads a JSON file of this folder.
+    #[track_caller]
+    pub fn json<T: DeserializeOwned>(&self, name: &str) -> T {
+        serde_json::from_slice(&fs::read(self.path().join(name)).unwrap()).unwrap()
+    }
+
     /// Runs the program in this folder.
     ///
     /// # Panics
