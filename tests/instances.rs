@@ -18,7 +18,7 @@ use fenestra::{
     session::Settings,
     shader::{
         constants::NO_MATERIAL,
-        structs::{Hit, Ray, ShadowRay},
+        structs::{Hit, Ray},
     },
 };
 use glam::{DMat3, DMat4, DVec3, Quat, Vec3, Vec4};
@@ -27,7 +27,10 @@ use crate::{
     support::{
         self, assert_error,
         random::Random,
-        rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, soup, sphere},
+        rays::{
+            ONE_PAGE, OnDevice, REFILLING, push, push_box, random_rays, random_shadow_rays, ray,
+            soup, sphere,
+        },
         replicates::{assert_same, film_mean, replicates},
         scenes,
     },
@@ -64,11 +67,6 @@ fn scene(count: u32, seed: u64, largest_scale: f32, spread: f32, mirrors: bool) 
         geometry.instances.extend(instance);
     }
     geometry
-}
-
-fn random_rays(count: usize, seed: u64, scale: f32) -> Vec<Ray> {
-    let mut random = Random(seed);
-    (0..count).map(|_| ray(scale * random.point(), random.direction_from_point())).collect()
 }
 
 /// Rays toward vertices and edges of the scene, where a tree loses triangles first.
@@ -206,12 +204,7 @@ fn shadow_rays_are_blocked_by_instances() {
     let hits: Vec<Hit> = (0..500)
         .map(|_| Hit { position: (5.0 * random.point()).into(), ..Hit::default() })
         .collect();
-    let directions: Vec<ShadowRay> = (0..2000)
-        .map(|_| ShadowRay {
-            direction: random.direction_from_point().into(),
-            contribution: [1.0; 3],
-        })
-        .collect();
+    let directions = random_shadow_rays(2000, &mut random);
     let flat = OnDevice::new(&Accel::build(&flat, ONE_PAGE).unwrap());
     let one = flat.shadow(&hits, &directions, REFILLING);
     for (tracer, on_device) in OnDevice::both(&Accel::build(&geometry, ONE_PAGE).unwrap()) {

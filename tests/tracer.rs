@@ -10,7 +10,7 @@ use fenestra::{
     pass::Schedule,
     scene::Scene,
     session::{Renderer, Settings},
-    shader::structs::{Hit, Ray, ShadowRay},
+    shader::structs::{Hit, Ray},
 };
 use glam::{DVec3, Vec3};
 
@@ -18,7 +18,7 @@ use crate::support::{
     self,
     command::{BALL, Folder, Run, program, yard},
     random::Random,
-    rays::{ONE_PAGE, OnDevice, REFILLING, ray},
+    rays::{ONE_PAGE, OnDevice, REFILLING, random_shadow_rays, ray},
 };
 
 const SCENES: [&str; 5] = ["bathroom", "courtyard", "meeting_room", "reading_room", "restroom"];
@@ -87,12 +87,7 @@ fn host_and_device_find_the_same_on_shipped_scenes() {
             // Coplanar surfaces of the scenes make more than edges do.
             assert!(100 * ties < rays.len(), "{name}, {generation}: {ties} ties");
             let hits: Vec<Hit> = ours.into_iter().filter(|hit| hit.distance >= 0.0).collect();
-            let directions: Vec<ShadowRay> = (0..2 * hits.len())
-                .map(|_| ShadowRay {
-                    direction: random.direction_from_point().into(),
-                    contribution: [1.0; 3],
-                })
-                .collect();
+            let directions = random_shadow_rays(2 * hits.len(), &mut random);
             let hits: Vec<Hit> = hits.iter().map(|hit| Hit { material: 0, ..*hit }).collect();
             let visible = [device, host].map(|tracer| tracer.shadow(&hits, &directions, REFILLING));
             let different = visible[0].iter().zip(&visible[1]).filter(|(one, other)| one != other);

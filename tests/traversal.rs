@@ -22,7 +22,10 @@ use crate::{
     support::{
         assert_error, device, is_software,
         random::Random,
-        rays::{ONE_PAGE, OnDevice, REFILLING, push, push_box, ray, scaled, soup, sphere},
+        rays::{
+            ONE_PAGE, OnDevice, REFILLING, push, push_box, random_rays, random_shadow_rays, ray,
+            scaled, soup, sphere,
+        },
     },
     twin::surface::surface_at,
 };
@@ -129,16 +132,11 @@ fn check_tracer(
     doubtful as f64 / rays.len() as f64
 }
 
-fn random_rays(count: usize, seed: u64, scale: f32) -> Vec<Ray> {
-    let mut random = Random(seed);
-    (0..count).map(|_| ray(1.5 * scale * random.point(), random.direction_from_point())).collect()
-}
-
 #[test]
 fn random_soups_match_brute_force() {
     for (count, seed) in [(1, 1), (2, 2), (9, 3), (100, 4), (3000, 5)] {
         let geometry = soup(count, seed);
-        let doubtful = check("soup", &geometry, &random_rays(2000, 100 + seed, 1.0));
+        let doubtful = check("soup", &geometry, &random_rays(2000, 100 + seed, 1.5));
         assert!(doubtful < 0.05, "{count} triangles: {doubtful} of the rays undecided");
     }
 }
@@ -151,7 +149,7 @@ fn an_empty_scene_is_left_by_every_ray() {
     for geometry in [Geometry::default(), zero_area] {
         let accel = Accel::build(&geometry, ONE_PAGE).unwrap();
         assert_eq!(accel.triangle_count(), 0);
-        let rays = random_rays(100, 7, 1.0);
+        let rays = random_rays(100, 7, 1.5);
         for (tracer, on_device) in OnDevice::both(&accel) {
             for hit in on_device.trace(&rays, REFILLING) {
                 assert_eq!((hit.material, hit.distance), (NO_MATERIAL, -1.0), "{tracer}");
@@ -177,7 +175,7 @@ fn degenerate_triangles_do_no_harm() {
         push(&mut geometry, [p, q, p.lerp(q, 0.5) + 1e-7 * random.point()]);
         push(&mut geometry, [p, q, p + 1e-4 * random.point()]);
     }
-    let doubtful = check("degenerate", &geometry, &random_rays(2000, 13, 1.0));
+    let doubtful = check("degenerate", &geometry, &random_rays(2000, 13, 1.5));
     assert!(doubtful < 0.1, "{doubtful}");
 }
 
@@ -187,14 +185,15 @@ fn coincident_triangles_are_one() {
     for _ in 0..2000 {
         push(&mut geometry, [Vec3::ZERO, Vec3::X, Vec3::Y]);
     }
-    check("coincident", &geometry, &random_rays(500, 17, 1.0));
+    check("coincident", &geometry, &random_rays(500, 17, 1.5));
 }
 
 #[test]
 fn small_and_large_coordinates_match_brute_force() {
     for scale in [1e-9, 1e-3, 1e3, 1e8] {
         let geometry = scaled(&soup(500, 21), scale);
-        let doubtful = check(&format!("scale {scale}"), &geometry, &random_rays(1000, 22, scale));
+        let doubtful =
+            check(&format!("scale {scale}"), &geometry, &random_rays(1000, 22, 1.5 * scale));
         assert!(doubtful < 0.1, "scale {scale}: {doubtful}");
     }
 }
@@ -241,7 +240,7 @@ fn obvhs_finds_the_same() {
         nodes: bytemuck::cast_slice::<_, CwBvhNode>(&accel.nodes).to_vec(),
         ..CwBvh::default()
     };
-    let rays = random_rays(20_000, 42, 1.0);
+    let rays = random_rays(20_000, 42, 1.5);
     for (tracer, on_device) in OnDevice::both(&accel) {
         let hits = on_device.trace(&rays, REFILLING);
         let mut different = 0;
@@ -367,7 +366,7 @@ fn rays_leave_their_surface_at_every_scale() {
 #[test]
 fn a_power_of_two_of_scale_changes_nothing() {
     let geometry = soup(1000, 71);
-    let rays = random_rays(3000, 72, 1.0);
+    let rays = random_rays(3000, 72, 1.5);
     let unscaled = Accel::build(&geometry, ONE_PAGE).unwrap();
     let references = OnDevice::both(&unscaled);
     let trace = |(_, on_device): &(_, OnDevice), rays: &[Ray]| on_device.trace(rays, REFILLING);
@@ -391,7 +390,7 @@ fn a_power_of_two_of_scale_changes_nothing() {
 #[test]
 fn pages_of_triangles_make_no_difference() {
     let geometry = soup(1000, 81);
-    let rays = random_rays(2000, 82, 1.0);
+    let rays = random_rays(2000, 82, 1.5);
     let whole = Accel::build(&geometry, ONE_PAGE).unwrap();
     let references = OnDevice::both(&whole);
     // 256, 512 and 1,024 triangles per page make four, two and one page.
@@ -415,7 +414,7 @@ fn rays_without_need_are_not_traced() {
 }
 
 fn check_needless(on_device: &OnDevice) {
-    let mut rays = random_rays(1000, 92, 1.0);
+    let mut rays = random_rays(1000, 92, 1.5);
     let all = on_device.trace(&rays, Schedule::SINGLE);
     for ray in rays.iter_mut().skip(1).step_by(3) {
         ray.is_active = 0;
@@ -460,17 +459,11 @@ fn shadow_rays_agree_with_closest_hits() {
 /// Compares shadow rays with those of the twin, but for `undecided` of them.
 fn check_shadows(accel: &Accel, on_device: &OnDevice, undecided: u32) {
     let hits: Vec<Hit> = on_device
-        .trace(&random_rays(3001, 102, 1.0), Schedule::SINGLE)
+        .trace(&random_rays(3001, 102, 1.5), Schedule::SINGLE)
         .into_iter()
         .filter(|hit| hit.material != NO_MATERIAL)
         .collect();
-    let mut random = Random(103);
-    let shadow_rays: Vec<ShadowRay> = (0..4 * hits.len())
-        .map(|_| ShadowRay {
-            direction: random.direction_from_point().into(),
-            contribution: [1.0; 3],
-        })
-        .collect();
+    let shadow_rays = random_shadow_rays(4 * hits.len(), &mut Random(103));
     let single = on_device.shadow(&hits, &shadow_rays, Schedule::SINGLE);
     let refilled = on_device.shadow(&hits, &shadow_rays, REFILLING);
     assert_eq!(single, refilled);
@@ -501,7 +494,7 @@ fn surfaces_are_consistent() {
 }
 
 fn check_surfaces(accel: &Accel, on_device: &OnDevice) {
-    let rays = random_rays(20_000, 111, 1.0);
+    let rays = random_rays(20_000, 111, 1.5);
     let mut turned = 0;
     for (ray, hit) in rays.iter().zip(on_device.trace(&rays, REFILLING)) {
         if hit.material == NO_MATERIAL {

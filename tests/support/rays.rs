@@ -13,7 +13,7 @@ use fenestra::{
 };
 use glam::{Quat, Vec3};
 
-use super::random::Random;
+use super::{random::Random, scenes};
 
 /// Size of a page that holds every test scene.
 pub const ONE_PAGE: u64 = 128 << 20;
@@ -44,23 +44,10 @@ pub fn soup(count: usize, seed: u64) -> Geometry {
 
 /// Adds the twelve triangles of a box with shared vertices, turned by `rotation`.
 pub fn push_box(geometry: &mut Geometry, centre: Vec3, half: Vec3, rotation: Quat) {
-    let first = geometry.positions.len() as u32;
-    for corner in 0..8_u32 {
-        let sign = Vec3::new(
-            if corner & 1 == 0 { -1.0 } else { 1.0 },
-            if corner & 2 == 0 { -1.0 } else { 1.0 },
-            if corner & 4 == 0 { -1.0 } else { 1.0 },
-        );
-        geometry.positions.push((centre + rotation * (sign * half)).to_array());
-        geometry.normals.push([0.0; 3]);
-    }
-    for [a, b, c, d] in
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
-    {
-        for triangle in [[a, b, c], [a, c, d]] {
-            geometry.triangles.push(triangle.map(|corner: u32| first + corner));
-            geometry.materials.push(0);
-        }
+    let first = geometry.positions.len();
+    scenes::add_box(geometry, Vec3::ZERO, 2.0 * half, 0);
+    for position in &mut geometry.positions[first..] {
+        *position = (centre + rotation * Vec3::from(*position)).to_array();
     }
 }
 
@@ -105,6 +92,18 @@ pub fn scaled(geometry: &Geometry, scale: f32) -> Geometry {
 
 pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
     Ray { origin: origin.into(), is_active: 1, direction: direction.into(), brdf_pdf: 0.0 }
+}
+
+/// Makes rays from places in the cube −`extent`…`extent`.
+pub fn random_rays(count: usize, seed: u64, extent: f32) -> Vec<Ray> {
+    let mut random = Random(seed);
+    (0..count).map(|_| ray(extent * random.point(), random.direction_from_point())).collect()
+}
+
+/// Makes shadow rays that bring light.
+pub fn random_shadow_rays(count: usize, random: &mut Random) -> Vec<ShadowRay> {
+    let mut direction = || random.direction_from_point().into();
+    (0..count).map(|_| ShadowRay { direction: direction(), contribution: [1.0; 3] }).collect()
 }
 
 fn wave(paths: usize, shadow_ray_count: u32) -> Wave {
