@@ -103,7 +103,7 @@ fn places_that_share_a_key_are_unbiased() {
     let scene = scenes::mixed_room();
     let mis = Settings { shadow_rays: 16, ..Settings::default() };
     let reference = replicates(&scene, &mis, FIRST_SEED, 128);
-    let mut teacher = Renderer::new(support::device(), &scene, guided(1)).unwrap();
+    let mut teacher = support::renderer(&scene, guided(1));
     teacher.render_pass(4).unwrap();
     let taught = teacher.guide_state().unwrap().unwrap();
     // Each of 256 regions takes two words to read and those to count; the shares come on top.
@@ -132,7 +132,7 @@ fn places_that_share_a_key_are_unbiased() {
         assert_near(&format!("{name}, {candidates} candidates"), &values, &reference, 0.05);
 
         // Check that keys are shared, or not, as the name says.
-        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
+        let mut renderer = support::renderer(&scene, settings);
         state.keys.truncate(6);
         state.counts.truncate(6 * state.origin.regions as usize);
         state.shares.truncate(6 * SHARE_WORDS);
@@ -215,8 +215,7 @@ fn later_vertices_have_the_rays_they_are_given() {
         settings.parameters.guided.later_rays = later_rays;
         // The choice of cohorts traces rays too.
         settings.parameters.share_paths = Some(1);
-        let mut renderer =
-            Renderer::new(support::device(), &scenes::mixed_room(), settings).unwrap();
+        let mut renderer = support::renderer(&scenes::mixed_room(), settings);
         renderer.render_pass(1).unwrap();
         f64::from(renderer.totals().shadow_rays_traced as u32)
     };
@@ -234,7 +233,7 @@ fn passes_may_be_grouped_at_will() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
     let render = |passes: &[u32]| {
-        let mut renderer = Renderer::new(support::device(), &scene, guided(4)).unwrap();
+        let mut renderer = support::renderer(&scene, guided(4));
         for samples in passes {
             renderer.render_pass(*samples).unwrap();
         }
@@ -259,7 +258,7 @@ fn pending_rays(renderer: &Renderer) -> f64 {
 fn late_samples_teach_by_one_in_four() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
-    let mut renderer = Renderer::new(support::device(), &scene, guided(1)).unwrap();
+    let mut renderer = support::renderer(&scene, guided(1));
     // The last rebuild comes after 64 samples.
     renderer.render_pass(80).unwrap();
     let first = pending_rays(&renderer);
@@ -271,7 +270,7 @@ fn late_samples_teach_by_one_in_four() {
     assert!((16.0 * one_more / first - 17.0).abs() < 0.1, "{first} → {one_more}");
     assert!((16.0 * four_more / first - 20.0).abs() < 0.2, "{first} → {four_more}");
     // The samples that teach do not depend on the grouping.
-    let mut other = Renderer::new(support::device(), &scene, guided(1)).unwrap();
+    let mut other = support::renderer(&scene, guided(1));
     for samples in [65, 16, 1, 14] {
         other.render_pass(samples).unwrap();
     }
@@ -287,7 +286,7 @@ fn parts_of_refined_cells_are_found() {
     let _alone = support::alone();
     let mut settings = guided(1);
     settings.parameters.guided.regions = 16;
-    let mut renderer = Renderer::new(support::device(), &scenes::mixed_room(), settings).unwrap();
+    let mut renderer = support::renderer(&scenes::mixed_room(), settings);
     renderer.render_pass(64).unwrap();
     support::assert_silent();
     let state = renderer.guide_state().unwrap().unwrap();
@@ -315,7 +314,7 @@ fn parts_of_refined_cells_are_found() {
 fn a_renderer_goes_on_where_another_stopped() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
-    let renderer = || Renderer::new(support::device(), &scene, guided(4)).unwrap();
+    let renderer = || support::renderer(&scene, guided(4));
     let mut whole = renderer();
     whole.render_pass(21).unwrap();
     let whole = whole.sums().unwrap();
@@ -372,7 +371,7 @@ fn every_epoch_has_its_own_random_numbers() {
 fn a_restart_forgets_the_regions_too() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
-    let mut renderer = Renderer::new(support::device(), &scene, guided(1)).unwrap();
+    let mut renderer = support::renderer(&scene, guided(1));
     renderer.render_pass(18).unwrap();
     let first = renderer.guide_state().unwrap().unwrap();
     let sums = renderer.sums().unwrap();
@@ -387,20 +386,20 @@ fn a_restart_forgets_the_regions_too() {
 fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
     let _alone = support::alone();
     let room = scenes::mixed_room();
-    let mut teacher = Renderer::new(support::device(), &room, guided(1)).unwrap();
+    let mut teacher = support::renderer(&room, guided(1));
     teacher.render_pass(4).unwrap();
     let state = teacher.guide_state().unwrap().unwrap();
     let mut moved = room.clone();
     for position in &mut moved.geometry.positions[72..] {
         position[1] += 0.2;
     }
-    let mut pupil = Renderer::new(support::device(), &moved, guided(1)).unwrap();
+    let mut pupil = support::renderer(&moved, guided(1));
     assert!(pupil.restore_guide(&state).unwrap(), "something moved");
     pupil.render_pass(2).unwrap();
     assert_eq!(pupil.totals().camera_rays, 2 * 32 * 24, "no training");
     let mut damaged = state.clone();
     damaged.rectangles[3][2] += 1;
-    let mut pupil = Renderer::new(support::device(), &room, guided(1)).unwrap();
+    let mut pupil = support::renderer(&room, guided(1));
     assert_error(pupil.restore_guide(&damaged), &["do not fill the map"]);
     // Refuse cells of a face that no cube has, and survive counts that no render has.
     let mut damaged = state.clone();
@@ -412,9 +411,9 @@ fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
     pupil.render_pass(1).unwrap();
     let mut darker = room.clone();
     darker.environment.texels[7] *= 0.5;
-    let mut pupil = Renderer::new(support::device(), &darker, guided(1)).unwrap();
+    let mut pupil = support::renderer(&darker, guided(1));
     assert_error(pupil.restore_guide(&state), &["another environment"]);
-    let mut mis = Renderer::new(support::device(), &room, Settings::default()).unwrap();
+    let mut mis = support::renderer(&room, Settings::default());
     assert!(mis.restore_guide(&state).is_err() && mis.guide_state().unwrap().is_none());
 }
 
@@ -423,7 +422,7 @@ fn in_the_open_it_samples_as_mis_does() {
     let _alone = support::alone();
     let scene = scenes::open(vec![scenes::diffuse(Vec3::splat(0.5)), scenes::plastic(0.2)]);
     let render = |settings: Settings| {
-        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
+        let mut renderer = support::renderer(&scene, settings);
         renderer.render_pass(6).unwrap();
         (renderer.sums().unwrap(), renderer.totals().camera_rays)
     };
@@ -440,7 +439,7 @@ fn rays_of_training_are_counted_and_more_rays_are_visible() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
     let share = |settings: Settings| {
-        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
+        let mut renderer = support::renderer(&scene, settings);
         renderer.render_pass(16).unwrap();
         let totals = renderer.totals();
         (totals.camera_rays, totals.shadow_rays_visible as f64 / totals.shadow_rays_traced as f64)
@@ -460,7 +459,7 @@ fn visible_rays_teach_how_surfaces_respond() {
     let scene = scenes::room(vec![scenes::diffuse(Vec3::splat(0.6))]);
     let units = 0.6 / std::f64::consts::PI * f64::from(GUIDE_RESPONSE_UNITS);
     for candidates in [1, 4] {
-        let mut renderer = Renderer::new(support::device(), &scene, guided(candidates)).unwrap();
+        let mut renderer = support::renderer(&scene, guided(candidates));
         renderer.render_pass(16).unwrap();
         let state = renderer.guide_state().unwrap().unwrap();
         let partition =
@@ -490,8 +489,7 @@ fn visible_rays_teach_how_surfaces_respond() {
 fn visible_rays_teach_the_share_of_the_brdf() {
     let _alone = support::alone();
     let state_after = |candidates: u32| {
-        let mut renderer =
-            Renderer::new(support::device(), &scenes::mixed_room(), guided(candidates)).unwrap();
+        let mut renderer = support::renderer(&scenes::mixed_room(), guided(candidates));
         renderer.render_pass(7).unwrap();
         renderer.guide_state().unwrap().unwrap()
     };

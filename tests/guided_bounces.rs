@@ -20,7 +20,7 @@ use fenestra::{
         regions::FACE_COUNT,
     },
     scene::Scene,
-    session::{Renderer, Settings, window_of},
+    session::{Settings, window_of},
     shader::{
         constants::CONSTANT_MATERIAL_KINDS,
         rooms::guided::CONSTANT_BOUNCE_CANDIDATES,
@@ -329,7 +329,7 @@ fn images_are_those_of_unguided_bounces() {
         estimates(&rows.iter().map(grey).collect::<Vec<_>>())
     };
     let reference = replicates(1, None, 32);
-    let mut taught = Renderer::new(support::device(), &scene, guided(4)).unwrap();
+    let mut taught = support::renderer(&scene, guided(4));
     taught.render_pass(4).unwrap();
     let mut beliefs = taught.guide_state().unwrap().unwrap();
     for (index, words) in beliefs.arrivals.iter_mut().enumerate() {
@@ -350,7 +350,7 @@ fn images_are_those_of_unguided_bounces() {
 fn every_bounce_teaches() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
-    let mut renderer = Renderer::new(support::device(), &scene, guided(3)).unwrap();
+    let mut renderer = support::renderer(&scene, guided(3));
     renderer.render_pass(2).unwrap();
     let before = renderer.totals().bounce_rays;
     // Render a sample after a rebuild.
@@ -371,7 +371,7 @@ fn every_bounce_teaches() {
     for (depth, candidates) in [(1, 4), (3, 1)] {
         let mut settings = guided(depth);
         settings.parameters.guided.bounce_candidates = candidates;
-        let mut renderer = Renderer::new(support::device(), &scene, settings).unwrap();
+        let mut renderer = support::renderer(&scene, settings);
         renderer.render_pass(3).unwrap();
         let state = renderer.guide_state().unwrap().unwrap();
         assert!(state.arrivals.is_empty() && state.pending_arrivals.is_empty());
@@ -384,7 +384,7 @@ fn every_bounce_teaches() {
 fn what_bounces_taught_is_kept() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
-    let renderer = |depth| Renderer::new(support::device(), &scene, guided(depth)).unwrap();
+    let renderer = |depth| support::renderer(&scene, guided(depth));
     let mut whole = renderer(3);
     whole.render_pass(21).unwrap();
     for stop in [3, 19] {

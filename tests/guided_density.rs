@@ -100,7 +100,7 @@ fn renderer_at_depth(surface: &Surface, candidates: u32, depth: u32) -> Renderer
         window: Some(Window { x, y, width: 1, height: 1 }),
         ..Settings::default()
     };
-    Renderer::new(support::device(), &surface.scene, settings).unwrap()
+    support::renderer(&surface.scene, settings)
 }
 
 /// The host's tables and frame for one surface.
