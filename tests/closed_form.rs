@@ -9,7 +9,7 @@ use fenestra::{
         product::{ProductParameters, Reading},
     },
     scene::{
-        Filter, Lamp, Portal, Scene,
+        Filter, Portal, Scene,
         lamp::LampKind,
         material::{Emission, Material, MaterialKind},
     },
@@ -45,7 +45,7 @@ fn groups_of_shadow_rays_see_the_environment_once() {
     let _alone = support::alone();
     let mut scene = scenes::convex_furnace(diffuse(Vec3::splat(0.5)), Vec3::new(1.0, 2.0, 3.0));
     let kind = LampKind::Directional { direction: Vec3::NEG_Y, irradiance: Vec3::ONE };
-    scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
+    scenes::add_lamp(&mut scene, kind);
     let sums = render(&scene, Settings { shadow_rays: 9, ..Settings::default() }, 1);
     assert!((DVec3::from(sums.mean(0)) - DVec3::new(1.0, 2.0, 3.0)).abs().max_element() < 1e-5);
 }

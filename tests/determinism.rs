@@ -7,7 +7,7 @@ use fenestra::{
     film::{Aov, Sums, Window},
     pass::{PathLists, Roulette},
     sampler::{Parameters, Sampler},
-    scene::{Filter, Lamp, Scene, lamp::LampKind},
+    scene::{Filter, Scene},
     session::{Event, Flag, Limit, Observer, Rules, Session, Settings, StopReason},
 };
 use glam::Vec3;
@@ -20,8 +20,8 @@ fn scene() -> Scene {
         vec![scenes::diffuse(Vec3::splat(0.7)), scenes::plastic(0.1), scenes::copper(0.2)];
     let mut scene = scenes::room(materials);
     scene.film.filter = Filter::Gaussian;
-    let kind = LampKind::Point { position: Vec3::new(0.3, 2.0, 0.4), intensity: Vec3::splat(0.2) };
-    scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: Some("key".into()) });
+    scenes::add_point(&mut scene, Vec3::new(0.3, 2.0, 0.4), Vec3::splat(0.2));
+    scene.lamps[0].light_group = Some("key".into());
     scene
 }
 

@@ -16,7 +16,11 @@ use fenestra::{
 use glam::{Vec2, Vec3};
 
 use crate::{
-    support::{self, assert_error, scenes, statistics::chi_square_p_value},
+    support::{
+        self, assert_error,
+        scenes::{self, map},
+        statistics::chi_square_p_value,
+    },
     twin::{environment::EnvironmentSampling as _, random::random_2d},
 };
 
@@ -24,16 +28,6 @@ const ENVIRONMENT_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/
 
 /// Chance of a false alarm: a test fails by chance for less than one seed in a million.
 const FALSE_ALARM: f64 = 1e-6;
-
-fn map(width: u32, height: u32, texel: impl Fn(u32, u32) -> Vec3) -> EnvironmentMap {
-    EnvironmentMap {
-        width,
-        height,
-        texels: (0..width * height).map(|index| texel(index % width, index / width)).collect(),
-        rotation_rad: 0.0,
-        source: "test".into(),
-    }
-}
 
 /// Makes a map whose only texel that is not black is (column, row).
 fn one_texel(width: u32, height: u32, column: u32, row: u32) -> EnvironmentMap {

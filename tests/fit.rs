@@ -22,26 +22,13 @@ use fenestra::{
 use glam::{Vec2, Vec3};
 
 use crate::{
-    support::assert_error,
+    support::{assert_error, scenes},
     twin::srbf::{Mixture, lobe_integral},
 };
 
 /// Tabulates a function of the direction as a map.
 fn map(width: u32, function: impl Fn(Vec3) -> Vec3) -> EnvironmentMap {
-    let height = width / 2;
-    let texel = |index: u32| {
-        let (x, y) = (index % width, index / width);
-        let u = (x as f32 + 0.5) / width as f32;
-        let v = (y as f32 + 0.5) / height as f32;
-        function(direction_from_lat_long(Vec2::new(u, v)))
-    };
-    EnvironmentMap {
-        width,
-        height,
-        texels: (0..width * height).map(texel).collect(),
-        rotation_rad: 0.0,
-        source: "test".into(),
-    }
+    EnvironmentMap { rotation_rad: 0.0, ..scenes::environment(width, function) }
 }
 
 fn fit_map(map: &EnvironmentMap, lobes: usize, method: Method) -> EnvironmentFit {

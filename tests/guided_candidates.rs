@@ -25,13 +25,13 @@ use fenestra::{
         structs::Wave,
     },
 };
-use glam::{DMat3, DVec3, Vec3, dvec3, vec3};
+use glam::{DMat3, DVec3, Vec3, dvec3};
 
 use crate::support::{
     self, PathInput,
     guide::Guide as _,
     hemisphere::{self, BINS},
-    materials, scenes, statistics,
+    scenes, statistics,
 };
 
 /// Candidates per surface and state.
@@ -101,15 +101,6 @@ fn surfaces() -> [Surface; 4] {
         surface("copper", 2, dvec3(-0.5, 0.8, -0.4), 0.8),
         surface("measured", 3, dvec3(0.0, 1.0, 0.0), 0.9),
     ]
-}
-
-fn scene() -> Scene {
-    scenes::room(vec![
-        scenes::diffuse(vec3(0.6, 0.5, 0.4)),
-        scenes::plastic(0.25),
-        scenes::copper(0.3),
-        materials::measured_plastic(),
-    ])
 }
 
 fn parameters() -> Parameters {
@@ -219,7 +210,7 @@ impl Paths {
 
 #[test]
 fn candidates_follow_the_density_that_they_are_divided_by() {
-    let scene = scene();
+    let scene = scenes::room(scenes::every_kind());
     let state = trained(&scene);
     let mut paths = Paths::new(&scene);
     // Expectations by surface and number of candidates.

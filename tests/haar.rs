@@ -21,7 +21,6 @@ use fenestra::{
             tree::{Tree, node_centre, place_in_square},
         },
     },
-    scene::Scene,
     session::{Settings, window_of},
     shader::{
         rooms::haar::{CONSTANT_HAAR_DEPTH, CONSTANT_HAAR_LEVEL},
@@ -105,15 +104,6 @@ fn surfaces() -> Vec<PathInput> {
     ]
 }
 
-fn scene() -> Scene {
-    scenes::open(vec![
-        scenes::diffuse(vec3(0.5, 0.4, 0.3)),
-        scenes::plastic(0.25),
-        scenes::copper(0.3),
-        materials::measured_plastic(),
-    ])
-}
-
 /// Passes and buffers around one wave of paths, one per surface.
 struct Paths {
     surfaces: Vec<PathInput>,
@@ -131,7 +121,7 @@ impl Paths {
     /// Makes paths with their product and an empty cache.
     fn new(assignments: &[&str]) -> Self {
         let (device, parameters) = (support::device(), support::parameters(assignments));
-        let (scene, surfaces) = (scene(), surfaces());
+        let (scene, surfaces) = (scenes::open(scenes::every_kind()), surfaces());
         let buffers =
             SceneBuffers::new(device, &scene, window_of(&Settings::default(), &scene)).unwrap();
         let tree = Tree::new(&scene.environment);

@@ -7,7 +7,7 @@ use std::{f32::consts::PI, sync::Arc};
 use fenestra::{
     sampler::Sampler,
     scene::{
-        Geometry, Lamp, Scene,
+        Geometry, Scene,
         lamp::{LampKind, Spot, SpotFalloff},
         material::{Emission, Material, MaterialKind},
         texture::{Interpolation, Texels, Texture, TextureUse},
@@ -162,7 +162,7 @@ fn lamps_without_a_surface_light_a_plane() {
             // Rays end at the lamp. The ceiling behind it is beside the camera's view.
             scenes::add_box(&mut scene.geometry, position + 0.1 * Vec3::Y, Vec3::splat(0.1), 0);
         }
-        scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
+        scenes::add_lamp(&mut scene, kind);
         scene
     };
     // Integrate I cosθ/d² · ρ/π over the part of the plane that the camera sees: its rays, by pixel.
@@ -234,8 +234,7 @@ fn lamps_of_unlike_power_add_up() {
     let mut scene = scenes::plane(Vec3::splat(0.5), black());
     for irradiance in [Vec3::new(1.0, 0.0, 0.0), Vec3::new(3.0, 0.0, 1.0), Vec3::new(0.0, 9.0, 0.0)]
     {
-        let kind = LampKind::Directional { direction: Vec3::NEG_Y, irradiance };
-        scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
+        scenes::add_lamp(&mut scene, LampKind::Directional { direction: Vec3::NEG_Y, irradiance });
     }
     assert_mean(&scene, settings(Sampler::Mis, 1), 128, 4.0 * 0.5 / f64::from(PI));
 }
@@ -440,11 +439,7 @@ fn the_back_of_a_one_sided_surface_is_black() {
     let mut scene = scenes::convex_furnace(scenes::diffuse(Vec3::splat(0.5)), Vec3::ONE);
     scene.camera.position = Vec3::new(0.1, 0.2, 0.3);
     scene.materials[0].surface.two_sided = false;
-    scene.lamps.push(Lamp {
-        name: "lamp".into(),
-        kind: LampKind::Point { position: Vec3::ZERO, intensity: Vec3::ONE },
-        light_group: None,
-    });
+    scenes::add_point(&mut scene, Vec3::ZERO, Vec3::ONE);
     let dark = mean(&scene, settings(Sampler::Mis, 2));
     assert!(dark == 0.0, "{dark}");
     scene.materials[0].surface.two_sided = true;

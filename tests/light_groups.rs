@@ -4,7 +4,7 @@
 use fenestra::{
     film::{Aov, Sums},
     sampler::{Parameters, Sampler},
-    scene::{EnvironmentMap, Filter, Lamp, Scene, lamp::LampKind},
+    scene::{EnvironmentMap, Filter, Lamp, Scene},
     session::{Renderer, Settings},
 };
 use glam::Vec3;
@@ -127,9 +127,9 @@ fn many_lamps_keep_their_groups() {
     let mut scene = scenes::mixed_room();
     for index in 0..40_u8 {
         let [x, z] = [index % 8, index / 8].map(|place| f32::from(place) * 0.4 - 1.4);
-        let kind = LampKind::Point { position: Vec3::new(x, 2.2, z), intensity: Vec3::ONE };
-        let light_group = Some(["left", "right", "environment"][usize::from(index % 3)].into());
-        scene.lamps.push(Lamp { name: String::new(), kind, light_group });
+        scenes::add_point(&mut scene, Vec3::new(x, 2.2, z), Vec3::ONE);
+        let group = ["left", "right", "environment"][usize::from(index % 3)];
+        scene.lamps[usize::from(index)].light_group = Some(group.into());
     }
     let settings = settings(Sampler::Mis, 2);
     let (sums, _) = support::render(&scene, settings.clone(), 8);

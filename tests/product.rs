@@ -19,7 +19,6 @@ use fenestra::{
         product::{Fits, LobeBuffers, LobeOrder, LobeSize, ProductParameters, Reading},
         visibility::{Threshold, VisibilityParameters, VisibilitySteps},
     },
-    scene::Scene,
     session::{Settings, window_of},
     shader::{
         bindings::{FILM, film},
@@ -153,15 +152,6 @@ fn surfaces() -> Vec<Surface> {
     ]
 }
 
-fn scene() -> Scene {
-    scenes::open(vec![
-        scenes::diffuse(Vec3::new(0.5, 0.4, 0.3)),
-        scenes::plastic(0.25),
-        scenes::copper(0.3),
-        materials::measured_plastic(),
-    ])
-}
-
 fn few_lobes() -> ProductParameters {
     ProductParameters {
         environment_lobes: 32,
@@ -189,7 +179,7 @@ impl Paths {
     fn new(product: ProductParameters, visibility: VisibilityParameters) -> Self {
         let parameters = Parameters { product, visibility, ..Parameters::default() };
         let device = support::device();
-        let (scene, surfaces) = (scene(), surfaces());
+        let (scene, surfaces) = (scenes::open(scenes::every_kind()), surfaces());
         let window = window_of(&Settings::default(), &scene);
         let buffers = SceneBuffers::new(device, &scene, window).unwrap();
         let fits = Fits::new(device, &scene, &product).unwrap();

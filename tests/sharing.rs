@@ -10,7 +10,7 @@ use fenestra::{
     pass::Roulette,
     sampler::Sampler,
     scene::{
-        Lamp, Scene,
+        Scene,
         lamp::{LampKind, Spot, SpotFalloff},
         material::{Emission, Material, MaterialKind},
         measured::MeasuredTable,
@@ -153,9 +153,7 @@ fn wall(bend_deg: f32) -> Scene {
     let (sine, cosine) = bend_deg.to_radians().sin_cos();
     scene.geometry.normals[first..].fill([cosine, -sine, 0.0]);
     for x in [-2.5, 2.5] {
-        let kind =
-            LampKind::Point { position: Vec3::new(x, 1.0, 0.0), intensity: Vec3::splat(20.0) };
-        scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
+        scenes::add_point(&mut scene, Vec3::new(x, 1.0, 0.0), Vec3::splat(20.0));
     }
     scene.name = format!("wall bent by {bend_deg}°");
     scene
@@ -207,9 +205,7 @@ fn the_same_seed_gives_the_same_bits_however_samples_are_grouped() {
 /// A room of these materials in turn, with a lamp besides the window.
 fn lit_room(materials: Vec<Material>) -> Scene {
     let mut scene = scenes::room(materials);
-    let position = Vec3::new(0.3, 2.1, 0.4);
-    let kind = LampKind::Point { position, intensity: Vec3::splat(2.0) };
-    scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
+    scenes::add_point(&mut scene, Vec3::new(0.3, 2.1, 0.4), Vec3::splat(2.0));
     scene
 }
 
@@ -238,7 +234,7 @@ fn before_a_wall_of_narrow_lobes() {
             outer_angle_rad: 0.5,
             falloff: SpotFalloff::default(),
         });
-        scene.lamps.push(Lamp { name: "spot".into(), kind, light_group: None });
+        scenes::add_lamp(&mut scene, kind);
     }
     scene.name = "wall of copper".into();
     agrees(&scene, &[(Sampler::Mis, "8")], 1024, &base(2));
@@ -267,8 +263,7 @@ fn light_from_beyond_a_sheet_stays_with_its_own_path() {
     scene.materials.push(sheet);
     scenes::add_box(&mut scene.geometry, 8.0 * Vec3::Y, Vec3::new(100.0, 1e-3, 100.0), 1);
     scenes::add_box(&mut scene.geometry, 12.0 * Vec3::Y, Vec3::new(40.0, 1.0, 40.0), 0);
-    let kind = LampKind::Point { position: 10.0 * Vec3::Y, intensity: Vec3::splat(50.0) };
-    scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
+    scenes::add_point(&mut scene, 10.0 * Vec3::Y, Vec3::splat(50.0));
     let picture = |edge, depth| render(&scene, settings(Sampler::Mis, edge, depth), &[8]).sum;
     let [alone, shared, direct] = [("off", 2), ("8", 2), ("off", 1)].map(|(e, d)| picture(e, d));
     for ((alone, shared), direct) in alone.iter().zip(&shared).zip(&direct) {

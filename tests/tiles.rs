@@ -37,7 +37,8 @@ use crate::{
     support::{
         self, PathInput,
         hemisphere::{self, BINS},
-        materials, render, replicates, scenes,
+        render, replicates,
+        scenes::{self, map},
         statistics::chi_square_p_value,
     },
     twin::{
@@ -49,20 +50,15 @@ use crate::{
 /// Chance of a false alarm of one χ² test; there are 12.
 const FALSE_ALARM: f64 = 1e-5;
 
-fn map(width: u32, height: u32, texel: impl Fn(usize) -> f32) -> EnvironmentMap {
-    let texels = (0..(width * height) as usize).map(|index| Vec3::splat(texel(index))).collect();
-    EnvironmentMap { width, height, texels, rotation_rad: 0.0, source: "test".into() }
-}
-
 /// The sky, black and constant maps, one bright texel, and fewer cells than tiles.
 fn maps() -> [EnvironmentMap; 6] {
     [
         scenes::sky(),
-        map(32, 16, |_| 0.0),
-        map(32, 16, |_| 2.0),
-        map(32, 16, |index| if index == 200 { 1e6 } else { 0.0 }),
-        map(2, 1, |index| index as f32),
-        map(1, 1, |_| 1.0),
+        map(32, 16, |_, _| Vec3::ZERO),
+        map(32, 16, |_, _| Vec3::splat(2.0)),
+        map(32, 16, |i, j| Vec3::splat(if (i, j) == (8, 6) { 1e6 } else { 0.0 })),
+        map(2, 1, |i, _| Vec3::splat(i as f32)),
+        map(1, 1, |_, _| Vec3::ONE),
     ]
 }
 
@@ -347,14 +343,6 @@ const SHADOW_RAYS: u32 = 8;
 fn rays_follow_the_density_that_they_are_divided_by() {
     let _alone = support::alone();
     let device = support::device();
-    let scene = || {
-        scenes::open(vec![
-            scenes::diffuse(vec3(0.5, 0.4, 0.3)),
-            scenes::plastic(0.25),
-            scenes::copper(0.3),
-            materials::measured_plastic(),
-        ])
-    };
     let surface = |index: u32| {
         let normal = vec3(0.3 * index as f32 - 0.4, 1.0, 0.2).normalize();
         let outgoing = frame_from_normal(normal).to_world(vec3(0.6, 0.0, 0.8));
@@ -363,7 +351,7 @@ fn rays_follow_the_density_that_they_are_divided_by() {
     let inputs: Vec<PathInput> = (0..4 * PATHS).map(|path| surface(path / PATHS)).collect();
     let mut of_states: Vec<[Vec<f64>; 4]> = Vec::new();
     for is_learned in [false, true] {
-        let cache = Cache::new(scene(), 128, is_learned);
+        let cache = Cache::new(scenes::open(scenes::every_kind()), 128, is_learned);
         let waves = WaveBuffers::new(
             device,
             4 * PATHS,

@@ -2,13 +2,16 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use fenestra::scene::{
-    Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Lamp, Scene,
-    lamp::LampKind,
-    material::{ConductorFresnel, Emission, Material, MaterialKind},
-    texture::{Texels, Texture, TextureUse},
+use fenestra::{
+    math::frame::direction_from_lat_long,
+    scene::{
+        Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Lamp, Scene,
+        lamp::LampKind,
+        material::{ConductorFresnel, Emission, Material, MaterialKind},
+        texture::{Texels, Texture, TextureUse},
+    },
 };
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::materials;
 
@@ -114,23 +117,31 @@ pub fn add_sphere(geometry: &mut Geometry, centre: Vec3, radius: f32, rings: u32
     }
 }
 
+/// Adds a lamp.
+pub fn add_lamp(scene: &mut Scene, kind: LampKind) {
+    scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
+}
+
+/// Adds a lamp that shines from a point.
+pub fn add_point(scene: &mut Scene, position: Vec3, intensity: Vec3) {
+    add_lamp(scene, LampKind::Point { position, intensity });
+}
+
 /// Tabulates a function of the direction in a map of `width` × `width / 2` texels.
 pub fn environment(width: u32, radiance: impl Fn(Vec3) -> Vec3) -> EnvironmentMap {
     let height = width / 2;
-    let texels = (0..height)
-        .flat_map(|row| (0..width).map(move |column| (column, row)))
-        .map(|(column, row)| {
-            let u = (column as f32 + 0.5) / width as f32;
-            let v = (row as f32 + 0.5) / height as f32;
-            let (azimuth, theta) = ((u - 0.5) * std::f32::consts::TAU, v * std::f32::consts::PI);
-            radiance(Vec3::new(
-                theta.sin() * azimuth.sin(),
-                theta.cos(),
-                -theta.sin() * azimuth.cos(),
-            ))
-        })
-        .collect();
-    EnvironmentMap { width, height, texels, rotation_rad: 0.3, source: "test".into() }
+    let map = map(width, height, |column, row| {
+        let u = (column as f32 + 0.5) / width as f32;
+        let v = (row as f32 + 0.5) / height as f32;
+        radiance(direction_from_lat_long(Vec2::new(u, v)))
+    });
+    EnvironmentMap { rotation_rad: 0.3, ..map }
+}
+
+/// Makes a map of the texels at every column and row.
+pub fn map(width: u32, height: u32, texel: impl Fn(u32, u32) -> Vec3) -> EnvironmentMap {
+    let texels = (0..width * height).map(|index| texel(index % width, index / width)).collect();
+    EnvironmentMap { width, height, texels, rotation_rad: 0.0, source: "test".into() }
 }
 
 /// Makes a sky with a bright patch low in the west, a blue zenith and a dim ground.
@@ -202,6 +213,12 @@ pub fn open(materials: Vec<Material>) -> Scene {
         materials,
         geometry,
     )
+}
+
+/// Makes a diffuse, a coated, a glossy and a measured material.
+pub fn every_kind() -> Vec<Material> {
+    let dull = diffuse(Vec3::new(0.5, 0.4, 0.3));
+    vec![dull, plastic(0.25), copper(0.3), materials::measured_plastic()]
 }
 
 /// Makes a [`room`] with a diffuse, a glossy and a coated material.
@@ -286,9 +303,7 @@ pub fn glazed_room() -> Scene {
     add_box(&mut scene.geometry, Vec3::new(-1.0, 1.0, 0.9), Vec3::new(0.6, 0.6, 0.01), 5);
     let uvs = scene.geometry.positions.iter().map(|&[x, y, z]| [x + y, z - y]);
     scene.geometry.uvs[0] = uvs.collect();
-    let position = Vec3::new(0.3, 2.3, 0.4);
-    let kind = LampKind::Point { position, intensity: Vec3::splat(1.5) };
-    scene.lamps.push(Lamp { name: "lamp".into(), kind, light_group: None });
+    add_point(&mut scene, Vec3::new(0.3, 2.3, 0.4), Vec3::splat(1.5));
     scene.name = "glazed_room".into();
     scene.hash = scene.name.clone();
     scene
