@@ -12,12 +12,12 @@ use std::{
 };
 
 use fenestra::{
-    film::{Attribute, Checkpoint, Image, Metadata, SampleRange, Sums, merge::merge_checkpoints},
+    film::{Attribute, Checkpoint, Image, Metadata, SampleRange, merge::merge_checkpoints},
     scene::files::write_atomically,
 };
 
 use crate::support::{
-    self, assert_error,
+    self, assert_error, checkpoint,
     command::{self, Folder, Run, Running, program},
 };
 
@@ -29,27 +29,6 @@ const GUIDED: [&str; 6] = ["render", "scene.toml", "-q", "--sampler=guided", "-o
 
 fn channels(folder: &Folder, name: &str) -> impl PartialEq + std::fmt::Debug + use<> {
     folder.image(name).channels
-}
-
-fn checkpoint() -> Checkpoint {
-    let mut sums = Sums::new([0, 0], 4, 2, [4, 2]);
-    for (index, value) in sums.sum.as_flattened_mut().iter_mut().enumerate() {
-        *value = 1.0 + index as f32;
-    }
-    sums.squares = sums.sum.clone();
-    sums.visible = vec![[3, 5]; 8];
-    sums.sample_count = 6;
-    let metadata = Metadata {
-        version: "0.1.0".to_owned(),
-        scene: "room".to_owned(),
-        sampler: "mis".to_owned(),
-        shadow_rays: 5,
-        depth: 1,
-        sample_ranges: vec![SampleRange { seed: 1, first: 2, count: 6 }],
-        seconds: 1.5,
-        ..Metadata::default()
-    };
-    Checkpoint { sums, metadata }
 }
 
 #[test]

@@ -11,7 +11,7 @@ use std::{fs, path::Path};
 
 use fenestra::{
     command::options::{parse_duration, parse_size},
-    film::{Checkpoint, Metadata, SampleRange, Sums},
+    film::Checkpoint,
     fit::{EnvironmentOptions, Fit, Method, environment_lobes, read_fit, write_fit},
     sampler::{
         Parameters,
@@ -26,7 +26,10 @@ use fenestra::{
 use glam::Vec3;
 use sha2::{Digest, Sha256};
 
-use crate::support::fuzz::{self, Target};
+use crate::support::{
+    self,
+    fuzz::{self, Target},
+};
 
 const STUDY: &str = r#"study = "What learning costs"
 notes = ["one", "two"]
@@ -59,25 +62,6 @@ fn written(name: &str, write: impl FnOnce(&Path)) -> Vec<u8> {
     let path = folder.path().join(name);
     write(&path);
     fs::read(path).unwrap()
-}
-
-/// A checkpoint of 4×2 pixels.
-fn checkpoint() -> Vec<u8> {
-    let mut sums = Sums::new([0, 0], 4, 2, [4, 2]);
-    sums.sum.as_flattened_mut().fill(3.0);
-    sums.squares = sums.sum.clone();
-    sums.visible = vec![[3, 5]; 8];
-    sums.sample_count = 6;
-    let metadata = Metadata {
-        version: "0.1.0".to_owned(),
-        sampler: "mis".to_owned(),
-        shadow_rays: 5,
-        depth: 1,
-        sample_ranges: vec![SampleRange { seed: 1, first: 2, count: 6 }],
-        seconds: 1.5,
-        ..Metadata::default()
-    };
-    written("a.exr", |path| Checkpoint { sums, metadata }.write(path).unwrap())
 }
 
 /// A guide of three cells and two regions.
@@ -169,8 +153,9 @@ fn mend_fit(bytes: &mut Vec<u8>) {
 
 fn targets() -> Vec<Target> {
     let only_bytes = |target| Target { is_file: false, ..target };
+    let checkpoint = written("a.exr", |path| support::checkpoint().write(path).unwrap());
     vec![
-        Target::new("checkpoint", "input.exr", vec![checkpoint()], |path, _| {
+        Target::new("checkpoint", "input.exr", vec![checkpoint], |path, _| {
             Checkpoint::read(path).is_ok()
         }),
         only_bytes(Target {

@@ -5,7 +5,10 @@
 use fenestra::film::{Checkpoint, Image, Metadata, SampleRange, Sums};
 use serde_json::Value;
 
-use crate::support::command::{self, Folder};
+use crate::support::{
+    self,
+    command::{self, Folder},
+};
 
 /// Makes a checkpoint of 4×2 pixels whose samples are all `value`.
 fn checkpoint(seed: u32, count: u32, value: f32) -> Checkpoint {
@@ -14,14 +17,10 @@ fn checkpoint(seed: u32, count: u32, value: f32) -> Checkpoint {
     sums.sum = vec![[count as f32 * value; 3]; 8];
     sums.squares = vec![[count as f32 * value * value; 3]; 8];
     let metadata = Metadata {
-        version: "0.1.0".to_owned(),
         scene_hash: "ab12".to_owned(),
-        sampler: "mis".to_owned(),
-        shadow_rays: 5,
-        depth: 1,
         sample_ranges: vec![SampleRange { seed, first: 0, count }],
         seconds: 2.0,
-        ..Metadata::default()
+        ..support::checkpoint().metadata
     };
     Checkpoint { sums, metadata }
 }

@@ -30,7 +30,7 @@ use std::{
 
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
-    film::Sums,
+    film::{Checkpoint, Metadata, SampleRange, Sums},
     gpu::{Buffer, Commands, DescriptorSet, Device, Pipeline},
     pass::{Totals, WaveBuffers},
     sampler::Parameters,
@@ -87,6 +87,28 @@ impl PathInput {
         commands.dispatch(&pipeline, &[waves.set(), &film], &[], inputs.len() as u32);
         commands.submit_and_wait().unwrap();
     }
+}
+
+/// A checkpoint of 4×2 pixels whose sums all differ.
+pub fn checkpoint() -> Checkpoint {
+    let mut sums = Sums::new([0, 0], 4, 2, [4, 2]);
+    for (index, value) in sums.sum.as_flattened_mut().iter_mut().enumerate() {
+        *value = 1.0 + index as f32;
+    }
+    sums.squares = sums.sum.clone();
+    sums.visible = vec![[3, 5]; 8];
+    sums.sample_count = 6;
+    let metadata = Metadata {
+        version: "0.1.0".to_owned(),
+        scene: "room".to_owned(),
+        sampler: "mis".to_owned(),
+        shadow_rays: 5,
+        depth: 1,
+        sample_ranges: vec![SampleRange { seed: 1, first: 2, count: 6 }],
+        seconds: 1.5,
+        ..Metadata::default()
+    };
+    Checkpoint { sums, metadata }
 }
 
 /// Returns the device of the tests, with validation and synchronization validation on.
