@@ -8,7 +8,7 @@ use fenestra::{
     study::metrics::{Metrics, relative_squared_errors},
 };
 
-use crate::support::assert_error;
+use crate::support::{assert_error, random::Random};
 
 /// Compares a picture with a reference taken as exact.
 fn against(picture: &RgbImage, reference: &RgbImage) -> Result<Metrics> {
@@ -160,13 +160,9 @@ fn two_halves_take_the_product_of_the_differences() {
 fn two_halves_are_free_of_the_references_noise() {
     // Picture exactly 1, halves with independent noise of variance 1/12: the plain error against
     // their mean is 1/24 on average, the product of differences 0.
-    let mut state = 1_u64;
-    let mut noise = || {
-        state =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1_u64 << 24) as f32 + 0.5
-    };
-    let mut noisy = || picture(100, &(0..10_000).map(|_| [noise(); 3]).collect::<Vec<_>>());
+    let mut random = Random(1);
+    let mut grey = || [random.uniform_f32() + 0.5; 3];
+    let mut noisy = || picture(100, &(0..10_000).map(|_| grey()).collect::<Vec<_>>());
     let (first, second) = (noisy(), noisy());
     let exact = picture(100, &[[1.0; 3]; 10_000]);
     let halves = Metrics::of_halves(&exact, &first, &second).unwrap();

@@ -36,7 +36,7 @@ use half::f16;
 use image::{DynamicImage, ImageFormat};
 
 use crate::{
-    support::{self, assert_error, materials, scenes},
+    support::{self, assert_error, materials, random::Random, scenes},
     twin::texture as twin,
 };
 
@@ -319,33 +319,13 @@ const TEXTURE_PAGE_SHIFT: u32 = 6;
 /// Attributes in smaller pages.
 const ATTRIBUTE_PAGE_SHIFT: u32 = 5;
 
-/// Random numbers in [0, 1), the same on every machine.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f32 {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1_u64 << 24) as f32
-    }
-
-    fn vector(&mut self) -> Vec3 {
-        let mut next = || 2.0 * self.next() - 1.0;
-        vec3(next(), next(), next())
-    }
-
-    fn below(&mut self, count: usize) -> usize {
-        (self.next() * count as f32) as usize
-    }
-}
-
-fn images(numbers: &mut Numbers) -> Vec<Arc<Texture>> {
-    let mut byte = || (numbers.next() * 256.0) as u8;
+fn images(numbers: &mut Random) -> Vec<Arc<Texture>> {
+    let mut byte = || (numbers.uniform_f32() * 256.0) as u8;
     let bytes = (0..15).map(|_| [byte(), byte(), byte(), byte()]).collect();
     let more = (0..64).map(|_| [byte(), byte(), byte(), byte()]).collect();
     let mut short = || u16::from(byte()) << 8 | u16::from(byte());
     let shorts = (0..35).map(|_| [short(), short(), short(), short()]).collect();
-    let mut float = || f16::from_f32(4.0 * numbers.next());
+    let mut float = || f16::from_f32(4.0 * numbers.uniform_f32());
     let halves = (0..36).map(|_| [float(), float(), float(), float()]).collect();
     vec![
         texture(5, 3, Texels::Bytes(bytes)),
@@ -357,14 +337,14 @@ fn images(numbers: &mut Numbers) -> Vec<Arc<Texture>> {
 }
 
 /// Every combination of what a use can say, with random placement.
-fn uses(images: &[Arc<Texture>], numbers: &mut Numbers) -> Vec<TextureUse> {
+fn uses(images: &[Arc<Texture>], numbers: &mut Random) -> Vec<TextureUse> {
     let mut uses = Vec::new();
     let wraps = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
     let channels =
         [Channels::Color, Channels::Red, Channels::Green, Channels::Blue, Channels::Alpha];
     for image in images {
         for index in 0..180 {
-            let mut number = || 2.0 * numbers.next() - 1.0;
+            let mut number = || 2.0 * numbers.uniform_f32() - 1.0;
             uses.push(TextureUse {
                 texture: Arc::clone(image),
                 channels: channels[index % 5],
@@ -401,23 +381,23 @@ fn materials(uses: &[TextureUse]) -> Vec<Material> {
 }
 
 /// Triangles with two sets of coordinates, tangents for most and colours.
-fn geometry(numbers: &mut Numbers) -> Geometry {
+fn geometry(numbers: &mut Random) -> Geometry {
     let mut geometry = Geometry::default();
     for triangle in 0..6 {
         let first = geometry.positions.len() as u32;
         geometry.triangles.push([first, first + 1, first + 2]);
         geometry.materials.push(0);
         for corner in 0..3 {
-            geometry.positions.push((5.0 * numbers.vector()).to_array());
+            geometry.positions.push((5.0 * numbers.point()).to_array());
             geometry.normals.push([0.0; 3]);
             for uvs in &mut geometry.uvs {
-                uvs.push((3.0 * numbers.vector()).truncate().to_array());
+                uvs.push((3.0 * numbers.point()).truncate().to_array());
             }
             let is_there = triangle % 3 != 0 || corner != 1;
-            let tangent = if is_there { numbers.vector().normalize() } else { Vec3::ZERO };
+            let tangent = if is_there { numbers.point().normalize() } else { Vec3::ZERO };
             let sign = if triangle % 2 == 0 { 1.0 } else { -1.0 };
             geometry.tangents.push(tangent.extend(sign).to_array());
-            geometry.colors.push([0, 1, 2, 3].map(|_| numbers.next()));
+            geometry.colors.push([0, 1, 2, 3].map(|_| numbers.uniform_f32()));
         }
     }
     geometry
@@ -466,7 +446,7 @@ fn pages(words: &[u32], shift: u32, names: [Binding; 4]) -> (u32, Vec<(Binding, 
 
 /// Compares shader and twins for triangles with the attributes `bits`.
 fn compare(bits: u32) {
-    let numbers = &mut Numbers(7);
+    let numbers = &mut Random(7);
     let uses = uses(&images(numbers), numbers);
     let surfaces = SurfaceTables::new(&materials(&uses));
     let textures = &surfaces.textures;
@@ -481,19 +461,19 @@ fn compare(bits: u32) {
     let queries: Vec<TextureQuery> = (0..20_000)
         .map(|index| {
             let material = index % surfaces.surfaces.len();
-            let mut uv = || (4.0 * numbers.vector()).truncate();
+            let mut uv = || (4.0 * numbers.point()).truncate();
             let (uv0, uv1) = (uv(), uv());
-            let [a, b] = [numbers.next(), numbers.next()];
+            let [a, b] = [numbers.uniform_f32(), numbers.uniform_f32()];
             let (a, b) = if a + b > 1.0 { (1.0 - a, 1.0 - b) } else { (a, b) };
             TextureQuery {
                 use_index: surfaces.surfaces[material].normal,
                 material: material as u32,
-                triangle: numbers.below(accel.triangle_count()) as u32,
+                triangle: (numbers.uniform_f32() * accel.triangle_count() as f32) as u32,
                 side: if index % 2 == 0 { 1.0 } else { -1.0 },
                 uv0,
                 uv1,
                 weights: vec3(a, b, 1.0 - a - b),
-                shading_normal: numbers.vector().normalize(),
+                shading_normal: numbers.point().normalize(),
             }
         })
         .collect();
@@ -654,7 +634,7 @@ fn textures_of_one_value_are_factors() {
 
 #[test]
 fn attributes_are_laid_out_where_materials_need_them() {
-    let numbers = &mut Numbers(1);
+    let numbers = &mut Random(1);
     let mut geometry = geometry(numbers);
     assert_eq!(attributes_of(&geometry), 15);
     geometry.tangents.clear();
