@@ -10,7 +10,11 @@ use std::{
 
 use fenestra::film::{Attribute, Image};
 
-use crate::support::command::{BALL, Folder, Run, Running, program, yard};
+use crate::support::{
+    c_library,
+    command::{BALL, Folder, Run, Running, program, yard},
+    random::Random,
+};
 
 const VARIABLE: &str = "FENESTRA_OIDN";
 const WIDTH: u32 = 24;
@@ -19,15 +23,12 @@ const HEIGHT: u32 = 20;
 /// Compiles the stand-in, with the names of version 1 if `is_old`.
 fn stub(folder: &Folder, is_old: bool) -> PathBuf {
     let place = folder.path().join("library");
-    fs::create_dir_all(&place).unwrap();
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/support/oidn.c");
-    let name = if is_old { "libOpenImageDenoise.so.1" } else { "libOpenImageDenoise.so.2" };
-    let mut compiler = Command::new("cc");
-    compiler.args(["-shared", "-fPIC", "-O1", "-o"]).arg(place.join(name)).arg(source).arg("-lm");
-    if is_old {
-        compiler.arg("-DOLD");
-    }
-    assert!(compiler.status().expect("setup installs a C compiler").success());
+    let (name, options) = if is_old {
+        ("libOpenImageDenoise.so.1", &["-lm", "-DOLD"][..])
+    } else {
+        ("libOpenImageDenoise.so.2", &["-lm"][..])
+    };
+    c_library::compile_to(&place.join(name), "oidn", options);
     place
 }
 
@@ -39,11 +40,8 @@ fn run(folder: &Folder, library: &Path, arguments: &[&str]) -> Run {
 /// Writes a grey film with noise of ±50% and its layers.
 fn noisy(folder: &Folder, name: &str, has_layers: bool) -> Image {
     let mut image = Image::new(WIDTH, HEIGHT);
-    let mut state = 1_u32;
-    let mut pixel = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        [0.2 + 0.2 * (state >> 8) as f32 / (1 << 24) as f32; 3]
-    };
+    let mut random = Random(1);
+    let mut pixel = || [0.2 + 0.2 * random.uniform_f32(); 3];
     let pixels: Vec<[f32; 3]> = (0..image.pixel_count()).map(|_| pixel()).collect();
     image.insert_triple(["R", "G", "B"], &pixels);
     if has_layers {

@@ -8,17 +8,21 @@ use std::{
     sync::OnceLock,
 };
 
-/// Compiles `tests/support/<name>.c`, with the compiler that links Rust programs, and returns the
-/// library, in a folder of its own.
+/// Compiles `tests/support/<name>.c` and returns the library, in a folder of its own.
 pub fn compile(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    fs::create_dir_all(&folder).unwrap();
     let library = folder.join(format!("lib{name}.so"));
+    compile_to(&library, name, &["-ldl"]);
+    library
+}
+
+/// Compiles `tests/support/<name>.c` with the compiler that links Rust programs.
+pub fn compile_to(library: &Path, name: &str, options: &[&str]) {
+    fs::create_dir_all(library.parent().unwrap()).unwrap();
     let source = format!("{}/tests/support/{name}.c", env!("CARGO_MANIFEST_DIR"));
     let mut compiler = Command::new("cc");
-    compiler.args(["-O1", "-shared", "-fPIC", &source, "-o"]).arg(&library).arg("-ldl");
-    assert!(compiler.status().expect("a C compiler").success());
-    library
+    compiler.args(["-O1", "-shared", "-fPIC", &source, "-o"]).arg(library).args(options);
+    assert!(compiler.status().expect("setup installs a C compiler").success());
 }
 
 /// Puts `faulty_files.c` under a program: its files in `folder` fail by the variable `fault`.
