@@ -29,6 +29,22 @@ fn render(scene: &Scene, settings: Settings, samples: u32) -> Sums {
     sums
 }
 
+/// Fails if a mean is seven errors or more from what is expected, and not `close` to it relative to it, or if
+/// the error is too large to judge. With 11 degrees of freedom a channel's |t| > 7 has a chance of 2.3e-5.
+fn assert_mean(
+    name: &str,
+    [mean, error]: [DVec3; 2],
+    expected: DVec3,
+    close: f64,
+    largest_error: f64,
+) {
+    eprintln!("{name}: {:.5} ± {:.5}", mean / expected, error / expected);
+    let z = (mean - expected) / error;
+    let is_close = (mean / expected - 1.0).abs().max_element() < close;
+    assert!(z.abs().max_element() < 7.0 || is_close, "{name}: {mean}, not {expected}, z {z}");
+    assert!((error / expected).max_element() < largest_error, "{name}: error {error}");
+}
+
 #[test]
 fn without_shadow_rays_only_the_environment_is_seen() {
     let _alone = support::alone();
@@ -209,17 +225,8 @@ fn irradiance_of_a_plane_is_the_integral_of_the_map() {
     let expected = reflectance.as_dvec3() * reflected_by_a_plane(&scene, |_| 1.0);
     for &sampler in Sampler::ALL {
         let settings = Settings { sampler, ..Settings::default() };
-        let [mean, error] = mean_and_error(&scene, &settings, 16, 12);
-        let z = (mean - expected) / error;
-        // 27 comparisons with 11 degrees of freedom: |t| > 7 has a chance of 6e-4 in all.
-        let close = (mean / expected - 1.0).abs().max_element() < 2e-4;
-        assert!(
-            z.abs().max_element() < 7.0 || close,
-            "{}: {mean} against {expected}, z {z}",
-            sampler.name()
-        );
-        let relative_error = (error / expected).max_element();
-        assert!(relative_error < 0.03, "{}: error {relative_error}", sampler.name());
+        let found = mean_and_error(&scene, &settings, 16, 12);
+        assert_mean(sampler.name(), found, expected, 2e-4, 0.03);
     }
 }
 
@@ -241,13 +248,8 @@ fn bright_and_dim_light_keep_their_colours() {
     let expected = 0.5 * reflected_by_a_plane(&scene, |_| 1.0);
     for (sampler, samples) in [(Sampler::Ris, 64), (Sampler::Mis, 16)] {
         let settings = Settings { sampler, ..Settings::default() };
-        let [mean, error] = mean_and_error(&scene, &settings, samples, 12);
-        let z = (mean - expected) / error;
-        eprintln!("{}: {:.4} ± {:.4}", sampler.name(), mean / expected, error / expected);
-        // Six comparisons with 11 degrees of freedom: |t| > 7 has a chance of 1.3e-4 in all.
-        let close = (mean / expected - 1.0).abs().max_element() < 2e-4;
-        assert!(z.abs().max_element() < 7.0 || close, "{}: {mean}, z {z}", sampler.name());
-        assert!((error / expected).max_element() < 2e-3, "{}: {error}", sampler.name());
+        let found = mean_and_error(&scene, &settings, samples, 12);
+        assert_mean(sampler.name(), found, expected, 2e-4, 2e-3);
     }
 }
 
@@ -286,13 +288,9 @@ fn guided_keeps_colours_beside_a_wall() {
     for (candidates, samples) in [(1, 256), (4, 128)] {
         let parameters = Parameters { candidates: Some(candidates), ..Parameters::default() };
         let settings = Settings { sampler: Sampler::Guided, parameters, ..Settings::default() };
-        let [mean, error] = mean_and_error(&scene, &settings, samples, 12);
-        let z = (mean - expected) / error;
-        eprintln!("{candidates}: {:.4} ± {:.4}, z {z:.1}", mean / expected, error / expected);
-        // Six comparisons as above. The places are those of pixel centres, good to 1e-3.
-        let close = (mean / expected - 1.0).abs().max_element() < 1e-3;
-        assert!(z.abs().max_element() < 7.0 || close, "{candidates} candidates: {mean}, z {z}");
-        assert!((error / expected).max_element() < 3e-3, "{candidates} candidates: {error}");
+        let found = mean_and_error(&scene, &settings, samples, 12);
+        // The places are those of pixel centres, good to 1e-3.
+        assert_mean(&format!("{candidates} candidates"), found, expected, 1e-3, 3e-3);
     }
 }
 
@@ -342,13 +340,8 @@ fn a_portal_leaves_the_mean_as_it_is() {
     scene.portals.push(Portal { name: "lid".into(), corner, axes, size: [60.0; 2] });
     for shadow_rays in [2, 9] {
         let settings = Settings { sampler: Sampler::Portal, shadow_rays, ..Settings::default() };
-        let [mean, error] = mean_and_error(&scene, &settings, 64, 12);
-        eprintln!("{shadow_rays} rays: {:.5} ± {:.5}", 2.0 * mean, 2.0 * error);
-        // Two comparisons with 11 degrees of freedom: |t| > 7 has a chance of 5e-5.
-        let z = (mean - 0.5) / error;
-        let close = (2.0 * mean - 1.0).abs().max_element() < 1e-4;
-        assert!(z.abs().max_element() < 7.0 || close, "{shadow_rays} rays: {mean}, z {z}");
-        assert!(error.max_element() < 1e-3, "{shadow_rays} rays: {error}");
+        let found = mean_and_error(&scene, &settings, 64, 12);
+        assert_mean(&format!("{shadow_rays} rays"), found, DVec3::splat(0.5), 1e-4, 2e-3);
     }
 }
 
@@ -366,14 +359,9 @@ fn techniques_are_weighed_by_the_rays_they_have() {
         let settings = Settings { shadow_rays, depth, ..Settings::default() };
         let [mean, error] = mean_and_error(&scene, &settings, 64, 12);
         let error = (error * error + expected_error * expected_error).map(f64::sqrt);
-        let ratio = mean / expected;
         let name = format!("{shadow_rays} rays, depth {depth}");
-        eprintln!("{name}: {ratio:.5} ± {:.5}", error / expected);
-        // Seven errors, which nine comparisons of 12 + 12 renders pass with a chance below 2e-4, or
-        // the rounding of the densities.
-        let far = ((ratio - 1.0) * expected / error).abs().max_element() > 7.0;
-        assert!(!far || (ratio - 1.0).abs().max_element() < 1e-4, "{name}: {ratio}");
-        assert!((error / expected).max_element() < 1e-3, "{name}: {error}");
+        // Densities are rounded.
+        assert_mean(&name, [mean, error], expected, 1e-4, 1e-3);
     }
 }
 
