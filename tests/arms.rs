@@ -37,6 +37,17 @@ fn guided(candidates: Option<u32>) -> Settings {
     }
 }
 
+/// An arm that guides nothing.
+const LEAN: Arm = Arm {
+    is_guided: false,
+    guides_bounces: false,
+    guides_later: false,
+    shares_paths: false,
+    candidates: 1,
+    rays: [1, 1],
+    roulette_throughput: 0.1,
+};
+
 /// A film large enough for several blocks.
 fn room() -> Scene {
     let mut scene = scenes::mixed_room();
@@ -108,27 +119,18 @@ fn whoever_goes_on_takes_the_recorded_arm() {
     first.render_pass(4).unwrap();
     assert_same(&first.sums().unwrap(), &second.sums().unwrap());
     // The recorded arm is taken, as far as the settings leave a choice.
-    let lean = Arm {
-        is_guided: false,
-        guides_bounces: false,
-        guides_later: false,
-        shares_paths: false,
-        candidates: 1,
-        rays: [1, 1],
-        roulette_throughput: 0.1,
-    };
-    let other = GuideState { arm: Some(lean), arm_since: 8, ..state.clone() };
+    let other = GuideState { arm: Some(LEAN), arm_since: 8, ..state.clone() };
     // So is the sample from which it has random numbers of its own, also if it is the arm of the start.
-    for arm in [lean, state.arm.unwrap()] {
+    for arm in [LEAN, state.arm.unwrap()] {
         let later = GuideState { arm: Some(arm), ..other.clone() };
         let second = go_on(guided(None), &later);
         assert_eq!(second.guide_state().unwrap().unwrap().arm_since, 8, "{arm}");
     }
     let recorded = |settings| go_on(settings, &other).guide_state().unwrap().unwrap().arm.unwrap();
-    assert_eq!(recorded(guided(None)), lean);
+    assert_eq!(recorded(guided(None)), LEAN);
     let mut settings = guided(None);
     settings.parameters.guided.later_rays = Some(2);
-    assert_eq!(recorded(settings), Arm { rays: [2, 2], ..lean });
+    assert_eq!(recorded(settings), Arm { rays: [2, 2], ..LEAN });
     let pinned = recorded(guided(Some(8)));
     assert!(pinned.is_guided && pinned.guides_bounces && pinned.candidates == 8);
     assert_eq!((pinned.rays, pinned.roulette_throughput), ([8, 2], 0.1));
@@ -156,15 +158,7 @@ fn the_picture_is_unbiased_whatever_is_chosen() {
 #[test]
 fn later_vertices_may_be_sampled_as_by_mis() {
     let _alone = support::alone();
-    let arm = Arm {
-        is_guided: true,
-        guides_bounces: false,
-        guides_later: false,
-        shares_paths: true,
-        candidates: 1,
-        rays: [8, 2],
-        roulette_throughput: 0.1,
-    };
+    let arm = Arm { is_guided: true, shares_paths: true, rays: [8, 2], ..LEAN };
     let half_open = scenes::open(vec![scenes::diffuse(Vec3::splat(0.8)), scenes::plastic(0.3)]);
     for scene in [scenes::mixed_room(), half_open] {
         let mut teacher = renderer(&scene, guided(None));
