@@ -124,18 +124,23 @@ impl Running {
             messages.read_to_string(&mut text).map(|_| text)
         });
         send(name, child.id());
-        let start = Instant::now();
-        let status = loop {
-            if let Some(status) = child.try_wait().unwrap() {
-                break status;
-            }
-            if start.elapsed() > LONGEST {
-                child.kill().unwrap();
-            }
-            thread::sleep(Duration::from_millis(20));
-        };
+        let status = end_of(&mut child, LONGEST);
         let messages = rest.join().unwrap().unwrap();
-        Run { status: status.code(), output: String::new(), messages }
+        Run { status, output: String::new(), messages }
+    }
+}
+
+/// Waits for the end of a process, which is killed after `longest`, and returns its exit status.
+pub fn end_of(child: &mut Child, longest: Duration) -> Option<i32> {
+    let start = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status.code();
+        }
+        if start.elapsed() > longest {
+            child.kill().unwrap();
+        }
+        thread::sleep(Duration::from_millis(20));
     }
 }
 
@@ -154,6 +159,12 @@ pub fn roofed_ball() -> String {
     format!("{BALL}\nmaterial = \"clay\"\n\n[[object]]\n{roof}")
 }
 
+/// Encodes a PFM map of these texels.
+pub fn pfm([width, height]: [usize; 2], texels: &[[f32; 3]]) -> Vec<u8> {
+    let values = texels.as_flattened().iter().flat_map(|value| value.to_le_bytes());
+    format!("PF\n{width} {height}\n-1.0\n").into_bytes().into_iter().chain(values).collect()
+}
+
 /// Fails unless `text` holds every part of `parts`.
 #[track_caller]
 pub fn assert_parts(text: &str, parts: &[&str]) {
@@ -168,6 +179,13 @@ impl Folder {
         let folder = Self::new();
         folder.write("scene.toml", yard(size, SKY, CLAY, object));
         folder
+    }
+
+    /// Writes an image of one colour.
+    pub fn write_image(&self, name: &str, [width, height]: [u32; 2], colour: [f32; 3]) {
+        let mut image = Image::new(width, height);
+        image.insert_triple(["R", "G", "B"], &vec![colour; image.pixel_count()]);
+        image.write_exr(&self.path().join(name)).unwrap();
     }
 
     /// Reads an image of this folder.

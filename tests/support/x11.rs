@@ -21,7 +21,7 @@ use x11rb::{
     rust_connection::RustConnection,
 };
 
-use super::command::{Folder, Run, program};
+use super::command::{Folder, Run, end_of, program};
 
 /// Longest wait for anything: a first render compiles its pipelines, on a machine that may be busy.
 const LONGEST: Duration = Duration::from_secs(120);
@@ -40,16 +40,8 @@ impl Server {
     /// Without Xvfb: run `./setup`.
     pub fn start() -> Self {
         let mut child = Command::new("Xvfb")
-            .args([
-                "-displayfd",
-                "1",
-                "-screen",
-                "0",
-                "1280x1024x24",
-                "-nolisten",
-                "tcp",
-                "-noreset",
-            ])
+            .args(["-displayfd", "1", "-screen", "0", "1280x1024x24"])
+            .args(["-nolisten", "tcp", "-noreset"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -146,43 +138,38 @@ impl<'a> View<'a> {
         thread::sleep(POLL);
     }
 
+    #[track_caller]
+    fn wait(&mut self, what: &str, is_met: impl Fn(&Self) -> bool) {
+        let start = Instant::now();
+        while !is_met(self) {
+            self.assert_running(start, what);
+        }
+    }
+
     /// Waits until `is_met`.
     #[track_caller]
     pub fn wait_until(&mut self, is_met: impl Fn(&Self) -> bool) {
-        let start = Instant::now();
-        while !is_met(self) {
-            self.assert_running(start, "the picture");
-        }
+        self.wait("the picture", is_met);
     }
 
     /// Waits until the title contains `text`.
     #[track_caller]
     pub fn wait_for(&mut self, text: &str) {
-        let start = Instant::now();
-        while !self.title().contains(text) {
-            self.assert_running(start, text);
-        }
+        self.wait(text, |view| view.title().contains(text));
     }
 
     /// Waits until the title contains `text` and the camera rests: a small film of one that moves soon has
     /// as many samples.
     #[track_caller]
     pub fn wait_at_rest(&mut self, text: &str) {
-        let start = Instant::now();
         let is_met = |title: &str| title.contains(text) && !title.contains("moving");
-        while !is_met(&self.title()) {
-            self.assert_running(start, text);
-        }
+        self.wait(text, |view| is_met(&view.title()));
     }
 
     /// Waits until a file is there.
     #[track_caller]
     pub fn wait_for_file(&mut self, name: &str) {
-        let path = self.folder.path().join(name);
-        let start = Instant::now();
-        while !path.exists() {
-            self.assert_running(start, name);
-        }
+        self.wait(name, |view| view.folder.path().join(name).exists());
     }
 
     /// Title of the window.
@@ -270,16 +257,9 @@ impl<'a> View<'a> {
 
     /// Waits for the end of the program.
     pub fn end(&mut self) -> Run {
-        let start = Instant::now();
-        while self.child.try_wait().unwrap().is_none() {
-            if start.elapsed() > LONGEST {
-                self.child.kill().unwrap();
-            }
-            thread::sleep(POLL);
-        }
+        let status = end_of(&mut self.child, LONGEST);
         let mut messages = String::new();
         self.child.stderr.take().unwrap().read_to_string(&mut messages).unwrap();
-        let status = self.child.wait().unwrap().code();
         Run { status, output: String::new(), messages }
     }
 }
