@@ -19,7 +19,8 @@ use glam::Vec3;
 
 use crate::support::{
     self, c_library,
-    command::{Folder, Run, Running, prepare, program},
+    command::{Folder, Run, Running, pfm, prepare, program},
+    png_chunk,
 };
 
 /// One quad, `quad.ply`, under a constant environment. Each case changes a part of it.
@@ -61,13 +62,6 @@ fn ply(vertices: &[&str], faces: &[&str]) -> String {
 
 const QUAD_VERTICES: [&str; 4] = ["-1 -1 0", "1 -1 0", "1 1 0", "-1 1 0"];
 const QUAD_FACES: [&str; 2] = ["3 0 1 2", "3 0 2 3"];
-
-/// Encodes a PFM map of 4×2 texels, all of `value`.
-fn pfm(value: f32) -> Vec<u8> {
-    let mut bytes = b"PF\n4 2\n-1.0\n".to_vec();
-    bytes.extend([value; 24].iter().flat_map(|component| component.to_le_bytes()));
-    bytes
-}
 
 /// Writes `quad.ply` and `scene.toml`, in which `new` replaces `old`, into a new folder.
 fn scene(old: &str, new: &str) -> Folder {
@@ -242,7 +236,7 @@ fn a_missing_or_truncated_map_is_named() {
         assert_refused(&folder, &[&format!("error: {name}: not a ")]);
     }
     let folder = with_map("sky.pfm");
-    let whole = pfm(1.0);
+    let whole = pfm([4, 2], &[[1.0; 3]; 8]);
     folder.write("sky.pfm", &whole[..whole.len() - 4]);
     let parts = ["error: sky.pfm: truncated: 4×2 texels of 3 floats need 96 bytes, found 92"];
     assert_refused(&folder, &parts);
@@ -250,11 +244,8 @@ fn a_missing_or_truncated_map_is_named() {
     folder.write("sky.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n\u{1}\u{1}");
     assert_refused(&folder, &["error: sky.hdr: not a readable Radiance file"]);
     let folder = with_map("sky.exr");
-    let mut image = Image::new(8, 4);
-    image.insert_triple(["R", "G", "B"], &[[1.0; 3]; 32]);
-    let path = folder.path().join("sky.exr");
-    image.write_exr(&path).unwrap();
-    let whole = fs::read(&path).unwrap();
+    folder.write_image("sky.exr", [8, 4], [1.0; 3]);
+    let whole = fs::read(folder.path().join("sky.exr")).unwrap();
     folder.write("sky.exr", &whole[..whole.len() - 5]);
     assert_refused(&folder, &["error: sky.exr: not a readable OpenEXR file"]);
     let folder = with_map("sky.png");
@@ -264,12 +255,11 @@ fn a_missing_or_truncated_map_is_named() {
 #[test]
 fn texels_that_are_not_radiance_never_reach_the_film() {
     let folder = scene("constant = [1.0, 1.0, 1.0]", "map = \"sky.pfm\"");
-    let mut map = pfm(1.0);
-    let first = map.len() - 96;
+    let mut texels = [[1.0; 3]; 8];
     for (texel, bad) in [(0, f32::NAN), (3, f32::INFINITY), (5, -1.0)] {
-        map[first + 12 * texel..first + 12 * texel + 4].copy_from_slice(&bad.to_le_bytes());
+        texels[texel][0] = bad;
     }
-    folder.write("sky.pfm", map);
+    folder.write("sky.pfm", pfm([4, 2], &texels));
     assert_renders(&folder, &["sky.pfm: 3 of 8 texels are negative, infinite", "were set to 0"]);
 }
 
@@ -451,9 +441,7 @@ fn an_output_is_a_file_a_device_or_standard_output() {
 #[test]
 fn an_output_never_replaces_an_input() {
     let folder = scene("constant = [1.0, 1.0, 1.0]", "map = \"m.exr\"");
-    let mut image = Image::new(8, 4);
-    image.insert_triple(["R", "G", "B"], &[[1.0; 3]; 32]);
-    image.write_exr(&folder.path().join("m.exr")).unwrap();
+    folder.write_image("m.exr", [8, 4], [1.0; 3]);
     folder.write("quad.obj", "mtllib quad.mtl\nv -1 -1 0\nv 1 -1 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
     folder.write("quad.mtl", "newmtl a\nKd 1 1 1\n");
     let text = fs::read_to_string(folder.path().join("scene.toml")).unwrap();
@@ -486,9 +474,7 @@ fn an_output_never_replaces_an_input() {
 #[test]
 fn no_command_writes_over_what_it_reads() {
     let folder = scene("constant = [1.0, 1.0, 1.0]", "map = \"m.exr\"");
-    let mut image = Image::new(8, 4);
-    image.insert_triple(["R", "G", "B"], &[[1.0; 3]; 32]);
-    image.write_exr(&folder.path().join("m.exr")).unwrap();
+    folder.write_image("m.exr", [8, 4], [1.0; 3]);
     folder.run(&["export", "scene.toml", "s.xml", "--format=mitsuba"]).assert(0, &[]);
     for name in ["a.exr", "b.exr"] {
         folder.run(&["render", "scene.toml", "--spp=1", "-o", name]).assert(0, &[]);
@@ -621,12 +607,7 @@ fn a_colour_profile_that_inflates_takes_no_memory() {
     let mut profile =
         flate2::write::ZlibEncoder::new(b"x\0\0".to_vec(), flate2::Compression::fast());
     (0..1024).for_each(|_| profile.write_all(&[0; 1 << 20]).unwrap());
-    let mut chunk = b"iCCP".to_vec();
-    chunk.extend(profile.finish().unwrap());
-    let mut sum = flate2::Crc::new();
-    sum.update(&chunk);
-    let length = (chunk.len() as u32 - 4).to_be_bytes();
-    let chunk = [&length[..], &chunk, &sum.sum().to_be_bytes()].concat();
+    let chunk = png_chunk(b"iCCP", &profile.finish().unwrap());
     image::RgbImage::new(2, 2).save(folder.path().join("bomb.png")).unwrap();
     let mut bytes = fs::read(folder.path().join("bomb.png")).unwrap();
     // Behind the signature and the header

@@ -4,26 +4,17 @@
 
 use std::{fs, process::Stdio};
 
-use fenestra::film::Image;
-
 use crate::support::{
     command::{BALL, Folder, Run, program},
     is_software,
 };
 
-/// Makes an image of one colour.
-fn image(width: u32, height: u32, value: f32) -> Image {
-    let mut image = Image::new(width, height);
-    image.insert_triple(["R", "G", "B"], &vec![[value; 3]; (width * height) as usize]);
-    image
-}
-
 /// Makes a folder with `a.exr` and `b.exr` of values 1 and 1.1, and `wide.exr` of another size.
 fn images() -> Folder {
     let folder = Folder::new();
-    image(8, 8, 1.0).write_exr(&folder.path().join("a.exr")).unwrap();
-    image(8, 8, 1.1).write_exr(&folder.path().join("b.exr")).unwrap();
-    image(16, 8, 1.0).write_exr(&folder.path().join("wide.exr")).unwrap();
+    folder.write_image("a.exr", [8, 8], [1.0; 3]);
+    folder.write_image("b.exr", [8, 8], [1.1; 3]);
+    folder.write_image("wide.exr", [16, 8], [1.0; 3]);
     folder
 }
 

@@ -600,9 +600,7 @@ fn flat_faces_keep_their_bumps_in_gltf() {
 fn images_of_radiance_keep_it_in_gltf() {
     let folder = Folder::new();
     write_square(&folder);
-    let mut image = Image::new(2, 2);
-    image.insert_triple(["R", "G", "B"], &[[4.0, 2.0, 0.5]; 4]);
-    image.write_exr(&folder.path().join("bright.exr")).unwrap();
+    folder.write_image("bright.exr", [2, 2], [4.0, 2.0, 0.5]);
     let clay = format!(
         "{DIFFUSE}\nemission = {{ texture = \"bright.exr\", factor = [2, 1, 1], wrap = \"clamp\" }}"
     );

@@ -6,22 +6,19 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::support::command::{Folder, Run, program};
+use crate::support::command::{Folder, Run, pfm, program};
 
-/// Encodes a grey PFM map of 16 × 8 texels, one of them bright.
-fn pfm() -> Vec<u8> {
-    let mut bytes = b"PF\n16 8\n-1.0\n".to_vec();
-    for texel in 0..16 * 8 {
-        let value = if texel == 70 { 50.0_f32 } else { 0.5 };
-        bytes.extend([value; 3].iter().flat_map(|value| value.to_le_bytes()));
-    }
-    bytes
+/// Encodes a grey map of 16 × 8 texels, one of them bright.
+fn sky() -> Vec<u8> {
+    let mut texels = [[0.5; 3]; 16 * 8];
+    texels[70] = [50.0; 3];
+    pfm([16, 8], &texels)
 }
 
 #[test]
 fn maps_are_fitted_pictured_and_described() {
     let folder = Folder::new();
-    folder.write("sky.pfm", pfm());
+    folder.write("sky.pfm", sky());
     let run = folder.run(&["fit", "env", "sky.pfm", "--lobes", "6", "--no-cache", "--json"]);
     run.assert(0, &[]);
     let value: Value = serde_json::from_str(&run.output).unwrap();
@@ -55,7 +52,7 @@ fn materials_are_fitted_in_words() {
 #[test]
 fn a_damaged_cache_is_a_warning() {
     let folder = Folder::new();
-    folder.write("sky.pfm", pfm());
+    folder.write("sky.pfm", sky());
     let fit = || {
         let mut command = program(folder.path());
         command.env("XDG_CACHE_HOME", folder.path().join("cache"));
@@ -76,7 +73,7 @@ fn a_damaged_cache_is_a_warning() {
 #[test]
 fn tables_list_every_fit() {
     let folder = Folder::new();
-    folder.write("sky.pfm", pfm());
+    folder.write("sky.pfm", sky());
     let arguments = [
         "fit",
         "table",
@@ -105,10 +102,8 @@ fn tables_list_every_fit() {
 #[test]
 fn bad_input_is_named() {
     let folder = Folder::new();
-    folder.write("sky.pfm", pfm());
-    let black =
-        pfm().iter().enumerate().map(|(i, b)| if i < 13 { *b } else { 0 }).collect::<Vec<_>>();
-    folder.write("black.pfm", black);
+    folder.write("sky.pfm", sky());
+    folder.write("black.pfm", pfm([16, 8], &[[0.0; 3]; 16 * 8]));
     folder.write("lying.binary", [90_u32, 90, 180].map(u32::to_le_bytes).concat());
     folder.write("short.brdf", "31 400 410");
     let fit = |arguments: &[&str]| {

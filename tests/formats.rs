@@ -249,7 +249,7 @@ fn a_render_without_light_says_so_and_does_not_count_as_converged() {
     let folder = Folder::new();
     let dark = command::yard([8, 6], "constant = [0, 0, 0]", command::CLAY, command::BALL);
     folder.write("dark.toml", &dark);
-    folder.write("black.pfm", [b"PF\n2 1\n-1.0\n".as_slice(), &[0; 24]].concat());
+    folder.write("black.pfm", command::pfm([2, 1], &[[0.0; 3]; 2]));
     let statistics = |options: &[&str]| -> Statistics {
         let options = [&["render", "-o", "a.exr", "--stats", "a.json"][..], options].concat();
         let run = folder.run(&options);

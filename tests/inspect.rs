@@ -102,9 +102,7 @@ fn parts_that_share_samples_or_show_something_else_are_refused() {
     write(&folder, "other", &other);
     let run = folder.run(&["merge", "a.exr", "other.checkpoint.exr", "-o", "out.exr"]);
     run.assert(1, &["not of one render with a.exr", "cd34 against ab12", "env against mis"]);
-    let mut foreign = Image::new(4, 2);
-    foreign.insert_triple(["R", "G", "B"], &[[1.0; 3]; 8]);
-    foreign.write_exr(&folder.path().join("foreign.exr")).unwrap();
+    folder.write_image("foreign.exr", [4, 2], [1.0; 3]);
     let run = folder.run(&["merge", "a.exr", "foreign.exr", "-o", "out.exr"]);
     run.assert(1, &["foreign.exr: no attribute fenestra."]);
     assert!(!folder.files().contains(&"out.exr".to_owned()));
@@ -137,11 +135,8 @@ fn info_warns_of_samples_that_are_not_finite() {
 #[test]
 fn info_reads_environment_maps() {
     let folder = Folder::new();
-    let mut map = b"PF\n2 1\n-1.0\n".to_vec();
-    for value in [1.0_f32, 2.0, 3.0, f32::NAN, 5.0, 6.0] {
-        map.extend(value.to_le_bytes());
-    }
-    folder.write("map.pfm", &map);
+    let texels = [[1.0, 2.0, 3.0], [f32::NAN, 5.0, 6.0]];
+    folder.write("map.pfm", command::pfm([2, 1], &texels));
     // The NaN is reported.
     let parts = ["environment map of 2x1 texels", "warning: "];
     folder.run(&["info", "map.pfm"]).assert_output(&parts);

@@ -17,7 +17,7 @@ use fenestra::{
 use glam::Vec3;
 use tempfile::TempDir;
 
-use crate::support::{self, random::Random, scenes};
+use crate::support::{self, command::pfm, random::Random, scenes};
 
 /// Standard errors by which the mean of a furnace may pass one.
 const FURNACE_LIMIT: f64 = 6.0;
@@ -141,12 +141,6 @@ fn scene_text(random: &mut Random, is_furnace: bool) -> String {
     text
 }
 
-fn pfm(texels: [f32; 32]) -> Vec<u8> {
-    let mut bytes = b"PF\n8 4\n-1.0\n".to_vec();
-    bytes.extend(texels.iter().flat_map(|texel| [texel.to_le_bytes(); 3]).flatten());
-    bytes
-}
-
 /// Fails with the scene if a pixel is impossible. Samples of `control-variates` are differences: a pixel
 /// of few of them may lie below zero, by its noise.
 fn check(sums: &Sums, sampler: Sampler, is_furnace: bool, what: &str) {
@@ -174,10 +168,10 @@ fn no_scene_makes_an_impossible_pixel() {
     let _alone = support::alone();
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("scene.toml");
-    let mut spot = [0.0; 32];
-    spot[11] = 1e7;
-    fs::write(folder.path().join("spot.pfm"), pfm(spot)).unwrap();
-    fs::write(folder.path().join("black.pfm"), pfm([0.0; 32])).unwrap();
+    let mut map = [[0.0; 3]; 32];
+    fs::write(folder.path().join("black.pfm"), pfm([8, 4], &map)).unwrap();
+    map[11] = [1e7; 3];
+    fs::write(folder.path().join("spot.pfm"), pfm([8, 4], &map)).unwrap();
     let first = setting("FENESTRA_PROPERTY_SEED", 1);
     let (mut rendered, mut refused) = (0, 0);
     for seed in first..first + setting("FENESTRA_PROPERTY_SCENES", 3) {

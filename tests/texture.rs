@@ -36,7 +36,7 @@ use half::f16;
 use image::{DynamicImage, ImageFormat};
 
 use crate::{
-    support::{self, assert_error, materials, random::Random, scenes},
+    support::{self, assert_error, materials, png_chunk, random::Random, scenes},
     twin::texture as twin,
 };
 
@@ -46,20 +46,6 @@ fn encode(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     image.write_to(&mut bytes, format).unwrap();
     bytes.into_inner()
-}
-
-/// Checksum of PNG, ISO 3309.
-fn crc(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(u32::MAX, |crc, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
-            (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 }
-        })
-    })
-}
-
-fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
-    let content = [name, data].concat();
-    [&(data.len() as u32).to_be_bytes()[..], &content, &crc(&content).to_be_bytes()].concat()
 }
 
 fn decode(bytes: &[u8]) -> Texture {
@@ -109,7 +95,7 @@ fn images_of_every_kind_become_texels() {
 fn colour_chunks_of_png_count_for_nothing() {
     let image = image::RgbImage::from_raw(1, 1, vec![10, 100, 200]).unwrap();
     let plain = encode(&image.into(), ImageFormat::Png);
-    let gamma = chunk(b"gAMA", &100_000_u32.to_be_bytes());
+    let gamma = png_chunk(b"gAMA", &100_000_u32.to_be_bytes());
     // The header is the first chunk: 8 bytes of signature, 25 of the header.
     let tagged = [&plain[..33], &gamma, &plain[33..]].concat();
     assert_eq!(decode(&tagged).texels, decode(&plain).texels);
@@ -141,7 +127,7 @@ fn damaged_and_huge_images_are_refused() {
     case(&png[..png.len() / 2], "not a readable image");
     let lie = |width: u32, height: u32| {
         let sizes = [width, height].map(u32::to_be_bytes).concat();
-        let header = chunk(b"IHDR", &[&sizes[..], &png[24..29]].concat());
+        let header = png_chunk(b"IHDR", &[&sizes[..], &png[24..29]].concat());
         [&png[..8], &header, &png[33..]].concat()
     };
     assert_eq!(lie(4, 4), png);

@@ -89,6 +89,14 @@ impl PathInput {
     }
 }
 
+/// Makes a chunk of a PNG file.
+pub fn png_chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let content = [name, data].concat();
+    let mut sum = flate2::Crc::new();
+    sum.update(&content);
+    [&(data.len() as u32).to_be_bytes()[..], &content, &sum.sum().to_be_bytes()].concat()
+}
+
 /// A checkpoint of 4×2 pixels whose sums all differ.
 pub fn checkpoint() -> Checkpoint {
     let mut sums = Sums::new([0, 0], 4, 2, [4, 2]);
