@@ -59,7 +59,7 @@ fn difference(found: Vec3, expected: Vec3, absolute: f32) -> f32 {
 fn shader_agrees_with_its_twin() {
     let queries: Vec<BrdfQuery> = (0..20_000).map(query).collect();
     let answers: Vec<BrdfAnswer> = support::run_probe(
-        include_bytes!(concat!(env!("OUT_DIR"), "/test/brdf.spv")),
+        "brdf",
         &[],
         &[
             (scene::MATERIALS, bytemuck::cast_slice(&tables().materials)),
@@ -140,7 +140,7 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
     };
     let queries: Vec<SpecularQuery> = (0..20_000).map(query).collect();
     let answers: Vec<SpecularAnswer> = support::run_probe(
-        include_bytes!(concat!(env!("OUT_DIR"), "/test/specular.spv")),
+        "specular",
         &[],
         &[(scene::MATERIALS, bytemuck::cast_slice(specular()))],
         &queries,

@@ -99,7 +99,7 @@ fn the_shader_agrees() {
             (CONSTANT_CONTROL_CHOICE, u32::from(control_choice)),
         ];
         let answers: Vec<Answer> = support::run_probe(
-            include_bytes!(concat!(env!("OUT_DIR"), "/test/control_variates.spv")),
+            "control_variates",
             &[&control[..], &grid.constants()].concat(),
             &[(scene::PARAMETERS, bytemuck::bytes_of(&parameters))],
             &queries,

@@ -24,8 +24,6 @@ use crate::{
     twin::{environment::EnvironmentSampling as _, random::random_2d},
 };
 
-const ENVIRONMENT_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/environment.spv"));
-
 /// Chance of a false alarm: a test fails by chance for less than one seed in a million.
 const FALSE_ALARM: f64 = 1e-6;
 
@@ -402,7 +400,7 @@ fn the_shader_agrees() {
             let texel = |texel: &Vec3| texel.extend(all[1].weight(*texel)).to_array();
             let texels: Vec<[f32; 4]> = map.texels.iter().map(texel).collect();
             let output: Vec<[f32; 11]> = support::run_probe(
-                ENVIRONMENT_PROBE,
+                "environment",
                 &[(CONSTANT_COMPENSATION, compensates as u32)],
                 &[
                     (scene::PARAMETERS, bytemuck::bytes_of(&parameters)),

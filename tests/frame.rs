@@ -9,8 +9,6 @@ use glam::{Vec2, Vec3};
 
 use crate::support;
 
-const FRAME_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/frame.spv"));
-
 /// Returns axes, directions on both sides of z = 0 and near the poles of either axis, and random ones.
 fn directions() -> Vec<Vec3> {
     let mut directions = vec![
@@ -90,7 +88,7 @@ fn the_shader_agrees() {
             input
         })
         .collect();
-    let output: Vec<[f32; 16]> = support::run_probe(FRAME_PROBE, &[], &[], &inputs);
+    let output: Vec<[f32; 16]> = support::run_probe("frame", &[], &[], &inputs);
     let mut worst = [0.0_f32; 16];
     for (input, shader) in inputs.iter().zip(&output) {
         let (normal, direction) = (Vec3::from_slice(input), Vec3::from_slice(&input[3..]));

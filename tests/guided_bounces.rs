@@ -42,8 +42,6 @@ use crate::{
     twin::{brdf, guided::arrival_direction, random::random_2d},
 };
 
-const ARRIVING_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/arriving.spv"));
-
 /// Pixels, and samples per pixel, of the paths before one surface.
 const PIXELS: u32 = 1024;
 const SAMPLES: u32 = 32;
@@ -60,7 +58,7 @@ fn the_shader_tells_directions_apart_as_the_host_does() {
         .collect();
     directions.extend([Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z]);
     let count = directions.len();
-    let output: Vec<u32> = support::run_probe(ARRIVING_PROBE, &[], &[], &directions);
+    let output: Vec<u32> = support::run_probe("arriving", &[], &[], &directions);
     let mut seen = [0_u32; ARRIVAL_DIRECTIONS];
     let mut differing = 0;
     for (direction, shader) in directions.iter().zip(&output) {

@@ -159,7 +159,6 @@ impl Paths {
             (CONSTANT_BRDF_CANDIDATES, candidates / 4),
             (CONSTANT_MATERIAL_KINDS, self.scene.surfaces().material_kinds),
         ];
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/guided_candidates.spv"));
         let wave = Wave {
             pixel_count: 1,
             sample_count: 1,
@@ -169,7 +168,13 @@ impl Paths {
             ..Wave::default()
         };
         let sets = [self.scene.set(), self.guide.set(), self.waves.set()];
-        support::run_probe_with(spirv, &constants, &sets, bytemuck::bytes_of(&wave), queries)
+        support::run_probe_with(
+            "guided_candidates",
+            &constants,
+            &sets,
+            bytemuck::bytes_of(&wave),
+            queries,
+        )
     }
 
     /// Draws the candidates of many rays and counts them by bin.

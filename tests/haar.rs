@@ -185,10 +185,9 @@ impl Paths {
             (CONSTANT_HAAR_LEVEL, self.level()),
             (CONSTANT_HAAR_DEPTH, self.tree.depth()),
         ];
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/haar.spv"));
         let sets = [self.scene.set(), self.nodes.set(), self.waves.set()];
         let push = bytemuck::bytes_of(&self.wave);
-        support::run_probe_with(spirv, &constants, &sets, push, queries)
+        support::run_probe_with("haar", &constants, &sets, push, queries)
     }
 
     /// Draws directions of one path; from its nodes alone if `only_nodes`.

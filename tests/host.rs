@@ -11,12 +11,10 @@ use fenestra::{
 
 use crate::support::{self, assert_error};
 
-const SHADER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/probe.spv"));
-
 #[test]
 fn a_probe_sees_its_input_and_returns_its_output() {
     let input: Vec<u32> = (0..1000).map(|i| i * i).collect();
-    let output: Vec<u32> = support::run_probe(SHADER, &[], &[], &input);
+    let output: Vec<u32> = support::run_probe("probe", &[], &[], &input);
     assert!(input.iter().zip(&output).all(|(input, output)| input + 1 == *output));
 }
 
@@ -46,7 +44,7 @@ fn every_timed_pass_has_its_row() {
         &[(probe::PROBE_INPUT, &output), (probe::PROBE_OUTPUT, &input)],
     )
     .unwrap();
-    let pipeline = Pipeline::new(device, "probe", SHADER, &[]).unwrap();
+    let pipeline = Pipeline::new(device, "probe", &support::spirv("probe"), &[]).unwrap();
     let mut commands = Commands::begin_timed(device, 4).unwrap();
     for _ in 0..2 {
         commands.dispatch(&pipeline, &[&forth], &[], 1 << 20);
@@ -115,7 +113,7 @@ fn a_mistake_is_heard_by_the_validation_layers() {
         &[(probe::PROBE_INPUT, &buffer), (probe::PROBE_OUTPUT, &buffer)],
     )
     .unwrap();
-    let pipeline = Pipeline::new(&device, "probe", SHADER, &[]).unwrap();
+    let pipeline = Pipeline::new(&device, "probe", &support::spirv("probe"), &[]).unwrap();
     let mut commands = Commands::begin(&device).unwrap();
     // Push constants come in multiples of four bytes.
     commands.dispatch(&pipeline, &[&set], &[0; 3], 1);

@@ -15,6 +15,8 @@ use fenestra::shader::{
     structs::SharedStruct,
 };
 
+use crate::support;
+
 /// One member on either side; `kind` is the GLSL type.
 #[derive(Clone, Debug, PartialEq)]
 struct Member {
@@ -253,7 +255,7 @@ fn probes() -> Vec<(String, Vec<u8>)> {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|extension| extension == "comp") {
             let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
-            let spirv = fs::read(format!("{}/test/{name}.spv", env!("OUT_DIR"))).unwrap();
+            let spirv = support::spirv(&name);
             probes.push((name, spirv));
         }
     }

@@ -84,9 +84,8 @@ fn draws(scene: &SceneBuffers, position: [f32; 3]) -> Vec<Answer> {
         Query { position, normal: [0.0, 1.0, 0.0], bits: [a, b] }
     };
     let queries: Vec<Query> = (0..DRAWS).map(query).collect();
-    let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/lamps.spv"));
     let constants = [(CONSTANT_SURFACES, scene.surfaces().features)];
-    support::run_probe_with(spirv, &constants, &[scene.set()], &[], &queries)
+    support::run_probe_with("lamps", &constants, &[scene.set()], &[], &queries)
 }
 
 #[test]

@@ -241,18 +241,18 @@ impl Paths {
         };
         let inputs: Vec<_> = self.inputs().into_iter().zip(outcomes).map(input).collect();
         PathInput::put(&inputs, &self.waves);
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_learn.spv"));
-        let densities: Vec<f32> = self.probe(spirv, false, &vec![0_u32; self.surfaces.len()]);
+        let densities: Vec<f32> =
+            self.probe("product_learn", false, &vec![0_u32; self.surfaces.len()]);
         assert!(densities.iter().all(|density| *density > 0.0), "{densities:?}");
     }
 
-    fn probe<Q: Pod, A: Pod>(&self, spirv: &[u8], with_scene: bool, queries: &[Q]) -> Vec<A> {
+    fn probe<Q: Pod, A: Pod>(&self, kernel: &str, with_scene: bool, queries: &[Q]) -> Vec<A> {
         let mut sets = vec![self.waves.set(), self.lobes.set()];
         if with_scene {
             sets.push(self.scene.set());
         }
         let push = bytemuck::bytes_of(&self.wave);
-        support::run_probe_with(spirv, &self.constants(), &sets, push, queries)
+        support::run_probe_with(kernel, &self.constants(), &sets, push, queries)
     }
 
     /// Returns the passes' specialization constants, for the probes.
@@ -272,8 +272,7 @@ impl Paths {
     }
 
     fn mixture(&self, queries: &[MixtureQuery]) -> Vec<MixtureAnswer> {
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_mixture.spv"));
-        self.probe(spirv, true, queries)
+        self.probe("product_mixture", true, queries)
     }
 
     /// Draws `count` directions of every path, path by path, with numbers of the given stream.
@@ -323,8 +322,7 @@ impl Paths {
         let queries: Vec<[u32; 2]> = (0..self.surfaces.len() as u32)
             .flat_map(|path| (0..kept).map(move |lobe| [path, lobe]))
             .collect();
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_lobe.spv"));
-        let answers: Vec<LobeAnswer> = self.probe(spirv, false, &queries);
+        let answers: Vec<LobeAnswer> = self.probe("product_lobe", false, &queries);
         answers
             .chunks(kept as usize)
             .map(|lobes| lobes[..lobes[0].lobe_count as usize].to_vec())

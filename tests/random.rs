@@ -180,8 +180,6 @@ fn the_mean_over_scrambles_is_unbiased_and_converges_faster_than_independent_num
     assert!(variance(&stratified) < variance(&independent) / 5.0);
 }
 
-const RANDOM_PROBE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/test/random.spv"));
-
 #[test]
 fn the_shader_draws_the_same_numbers_bit_for_bit() {
     let mut keys: Vec<[u32; 4]> = Vec::new();
@@ -191,7 +189,7 @@ fn the_shader_draws_the_same_numbers_bit_for_bit() {
     }
     keys.push([u32::MAX; 4]);
     keys.push([0; 4]);
-    let output: Vec<[f32; 6]> = support::run_probe(RANDOM_PROBE, &[], &[], &keys);
+    let output: Vec<[f32; 6]> = support::run_probe("random", &[], &[], &keys);
     for (&[pixel, sample, dimension, seed], shader) in keys.iter().zip(output) {
         let stratified = random_2d(pixel, sample, dimension, seed);
         let independent = random_independent_2d(pixel, sample, dimension, seed);

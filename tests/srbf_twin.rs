@@ -64,8 +64,7 @@ fn shader_twin_agrees_over_the_whole_range() {
             }
         })
         .collect();
-    let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/srbf.spv"));
-    let outputs: Vec<ProbeOutput> = support::run_probe(spirv, &[], &[], &inputs);
+    let outputs: Vec<ProbeOutput> = support::run_probe("srbf", &[], &[], &inputs);
     for (input, shader) in inputs.iter().zip(&outputs) {
         let check = |name: &str, found: f32, expected: f32, tolerance: f32| {
             assert!(

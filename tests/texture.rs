@@ -500,12 +500,7 @@ fn compare(bits: u32) {
         (CONSTANT_ATTRIBUTE_PAGE_SHIFT, shift),
         (CONSTANT_ATTRIBUTES, attributes.bits),
     ];
-    let answers: Vec<TextureAnswer> = support::run_probe(
-        include_bytes!(concat!(env!("OUT_DIR"), "/test/texture.spv")),
-        &constants,
-        &buffers,
-        &queries,
-    );
+    let answers: Vec<TextureAnswer> = support::run_probe("texture", &constants, &buffers, &queries);
 
     // Rounding may move a point into the next texel of a texture without interpolation, and turn an
     // opacity at its cutoff.

@@ -283,9 +283,8 @@ impl Cache {
     }
 
     fn probe(&self, queries: &[Query]) -> Vec<Answer> {
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/tiles.spv"));
         let sets = [self.scene_buffers.set(), self.buffers.set()];
-        support::run_probe_with(spirv, &[(CONSTANT_TILES, self.tiles)], &sets, &[], queries)
+        support::run_probe_with("tiles", &[(CONSTANT_TILES, self.tiles)], &sets, &[], queries)
     }
 }
 

@@ -25,6 +25,7 @@ pub mod x11;
 
 use std::{
     borrow::Borrow,
+    fs,
     sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
 };
 
@@ -80,8 +81,8 @@ impl PathInput {
     /// Writes ray, hit, and a shadow ray with its outcome for every path of a wave.
     pub fn put(inputs: &[Self], waves: &WaveBuffers) {
         let input = Buffer::from_slice(device(), "paths", inputs).unwrap();
-        let spirv = include_bytes!(concat!(env!("OUT_DIR"), "/test/product_state.spv"));
-        let pipeline = Pipeline::new(device(), "product_state", spirv, &[]).unwrap();
+        let pipeline =
+            Pipeline::new(device(), "product_state", &spirv("product_state"), &[]).unwrap();
         let film = DescriptorSet::new(device(), &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
         let mut commands = Commands::begin(device()).unwrap();
         commands.dispatch(&pipeline, &[waves.set(), &film], &[], inputs.len() as u32);
@@ -177,10 +178,15 @@ pub fn assert_error<T>(result: Result<T, impl ToString>, parts: &[&str]) {
     }
 }
 
+/// Reads the SPIR-V that the build makes of `glsl/test/<name>.comp`.
+pub fn spirv(name: &str) -> Vec<u8> {
+    fs::read(format!("{}/test/{name}.spv", env!("OUT_DIR"))).unwrap()
+}
+
 /// Runs a probe kernel over `queries` with specialization constants and with buffers of the scene, and returns
 /// its answer to each.
 pub fn run_probe<Q: Pod, A: Pod>(
-    spirv: &[u8],
+    kernel: &str,
     constants: &[(u32, u32)],
     buffers: &[(Binding, &[u8])],
     queries: &[Q],
@@ -192,12 +198,12 @@ pub fn run_probe<Q: Pod, A: Pod>(
     let bound: Vec<_> = uploaded.iter().map(|(binding, buffer)| (*binding, buffer)).collect();
     let make = || DescriptorSet::new(device(), &SCENE, &bound).unwrap();
     let scene = (!bound.is_empty()).then(make);
-    run_probe_with(spirv, constants, scene.as_slice(), &[], queries)
+    run_probe_with(kernel, constants, scene.as_slice(), &[], queries)
 }
 
 /// As [`run_probe`], with the sets and the push constants of a pass.
 pub fn run_probe_with<Q: Pod, A: Pod>(
-    spirv: &[u8],
+    kernel: &str,
     constants: &[(u32, u32)],
     sets: &[impl Borrow<DescriptorSet>],
     push: &[u8],
@@ -209,7 +215,7 @@ pub fn run_probe_with<Q: Pod, A: Pod>(
     let output = Buffer::zeroed(device, "answers", bytes).unwrap();
     let bound = [(probe::PROBE_INPUT, &input), (probe::PROBE_OUTPUT, &output)];
     let own = DescriptorSet::new(device, &PROBE, &bound).unwrap();
-    let pipeline = Pipeline::new(device, "probe", spirv, constants).unwrap();
+    let pipeline = Pipeline::new(device, kernel, &spirv(kernel), constants).unwrap();
     let sets: Vec<_> = sets.iter().map(Borrow::borrow).chain([&own]).collect();
     let mut commands = Commands::begin(device).unwrap();
     commands.dispatch(&pipeline, &sets, push, queries.len() as u32);
