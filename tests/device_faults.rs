@@ -8,7 +8,7 @@ use std::{fs, process::Command};
 use fenestra::film::{Checkpoint, checkpoint::remove_checkpoint};
 
 use crate::support::{
-    command::{BALL, Folder, Run, program},
+    command::{BALL, Folder, Run, program, words},
     faulty_layer,
 };
 
@@ -34,15 +34,7 @@ fn a_driver_that_computes_wrong_or_crashes_is_refused() {
         let mut command = program(folder.path());
         faulty_layer::insert(&mut command, &[fault]);
         command.env("XDG_CACHE_HOME", folder.path().join("cache")).env("LP_SETTING", setting);
-        command.args([
-            "render",
-            "scene.toml",
-            "-q",
-            "--spp=1",
-            "-o",
-            "out.exr",
-            "--sampler=cosine",
-        ]);
+        command.args(words("render scene.toml -q --spp=1 -o out.exr --sampler=cosine"));
         Run::of(&command.output().unwrap())
     };
     for (fault, part) in [

@@ -180,19 +180,11 @@ fn a_failing_checkpoint_does_not_cost_the_image() {
     let folder = folder();
     fs::create_dir(folder.path().join("out.checkpoint.exr")).unwrap();
     for sampler in ["mis", "guided"] {
-        let sampler = format!("--sampler={sampler}");
-        let options = [
-            "render",
-            "scene.toml",
-            &sampler,
-            "--spp=20",
-            "--checkpoint-interval=1ms",
-            "--png",
-            "--stats=stats.json",
-            "-o",
-            "out.exr",
-        ];
-        let run = folder.run(&options);
+        let options = format!(
+            "render scene.toml --sampler={sampler} --spp=20 --checkpoint-interval=1ms --png \
+             --stats=stats.json -o out.exr"
+        );
+        let run = folder.run(&command::words(&options));
         run.assert(1, &["out.checkpoint.exr: cannot write", "the next checkpoint tries again"]);
         assert!(run.messages.contains("wrote out.exr, out.png, stats.json"), "{}", run.messages);
         let image = folder.image("out.exr");

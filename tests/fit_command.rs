@@ -6,7 +6,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::support::command::{Folder, Run, pfm, program};
+use crate::support::command::{Folder, Run, pfm, program, words};
 
 /// Encodes a grey map of 16 × 8 texels, one of them bright.
 fn sky() -> Vec<u8> {
@@ -74,25 +74,11 @@ fn a_damaged_cache_is_a_warning() {
 fn tables_list_every_fit() {
     let folder = Folder::new();
     folder.write("sky.pfm", sky());
-    let arguments = [
-        "fit",
-        "table",
-        "sky.pfm",
-        "diffuse:reflectance=0.5",
-        "--environment-lobes",
-        "2,4",
-        "--brdf-lobes",
-        "3",
-        "--views",
-        "4",
-        "--quiet",
-        "-o",
-        "table.md",
-        "--pictures",
-        "pictures",
-    ];
-    let run = folder.run(&arguments);
-    run.assert(0, &[]);
+    let arguments = words(
+        "fit table sky.pfm diffuse:reflectance=0.5 --environment-lobes 2,4 --brdf-lobes 3 --views 4 \
+         --quiet -o table.md --pictures pictures",
+    );
+    folder.run(&arguments).assert(0, &[]);
     let table = fs::read_to_string(folder.path().join("table.md")).unwrap();
     assert_eq!(table.matches("| sky |").count(), 2, "{table}");
     assert_eq!(table.matches("| diffuse:reflectance=0.5 | 3 × 4 |").count(), 1, "{table}");

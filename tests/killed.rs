@@ -10,20 +10,12 @@ use fenestra::film::{Attribute, Checkpoint, Image, checkpoint::guide_paths};
 
 use crate::support::{
     c_library,
-    command::{Folder, Run, program, roofed_ball},
+    command::{Folder, Run, program, roofed_ball, words},
 };
 
 /// Choices by measurement would differ from render to render.
-const GUIDED: [&str; 8] = [
-    "render",
-    "scene.toml",
-    "-q",
-    "--sampler=guided",
-    "--set=candidates=1",
-    "--set=share-paths=off",
-    "-o",
-    "out.exr",
-];
+const GUIDED: &str =
+    "render scene.toml -q --sampler=guided --set=candidates=1 --set=share-paths=off -o out.exr";
 const PICTURE: &str = "out.exr";
 const CHECKPOINT: &str = "out.checkpoint.exr";
 /// Messages of the library.
@@ -43,7 +35,7 @@ fn render(folder: &Folder, fault: Option<(&str, u64)>, options: &[&str]) -> Run 
     if let Some(fault) = fault {
         c_library::fail_in(&mut command, folder.path(), fault);
     }
-    Run::of(&command.args(GUIDED).args(options).output().unwrap())
+    Run::of(&command.args(words(GUIDED)).args(options).output().unwrap())
 }
 
 /// Returns the samples of the checkpoint, which must be whole, as its guide must be.

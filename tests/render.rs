@@ -59,16 +59,9 @@ fn rays_are_counted_by_kind() {
 #[test]
 fn layers_preview_and_window_are_written() {
     let folder = folder();
-    let options = [
-        "--spp",
-        "2",
-        "--aov",
-        "Albedo,N,P,Visible,Variance,SampleCount",
-        "--png",
-        "--crop",
-        "10,5,30,20",
-        "--validate",
-    ];
+    let options = command::words(
+        "--spp 2 --aov Albedo,N,P,Visible,Variance,SampleCount --png --crop 10,5,30,20 --validate",
+    );
     let (image, statistics) = render(&folder, "sub/out.exr", &options);
     assert_eq!((image.width, image.height, image.origin), (20, 15, [10, 5]));
     assert_eq!(image.film_size, [40, 24]);

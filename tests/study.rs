@@ -19,21 +19,15 @@ use serde_json::Value;
 
 use crate::support::{
     c_library,
-    command::{self, Folder, Run, Running, program},
+    command::{self, Folder, Run, Running, program, words},
 };
 
-const SMALL: [&str; 10] = [
-    "study",
-    "yard.toml",
-    "--samplers=mis,ris",
-    "--spp=4,6",
-    "--seeds=2",
-    "--reference-spp=128",
-    "--shadow-rays=2",
-    "-o",
-    "report",
-    "--quiet",
-];
+fn small() -> Vec<&'static str> {
+    words(
+        "study yard.toml --samplers=mis,ris --spp=4,6 --seeds=2 --reference-spp=128 --shadow-rays=2 \
+         -o report --quiet",
+    )
+}
 
 /// Formats a scene file of a box on a floor under the sky.
 fn yard(diffuse: &str) -> String {
@@ -132,7 +126,7 @@ fn changed(folder: &Folder, name: &str) -> std::time::SystemTime {
 #[test]
 fn a_study_has_every_figure() {
     let folder = folder();
-    let run = folder.run(&with(&SMALL, &["--time=100ms", "--json", "--validate"]));
+    let run = folder.run(&with(&small(), &["--time=100ms", "--json", "--validate"]));
     run.assert(0, &[]);
     let results = json(&folder, "results.json");
     let printed: Value = serde_json::from_str(&run.output).unwrap();
@@ -272,13 +266,13 @@ fn a_study_has_every_figure() {
 #[test]
 fn the_same_seed_has_the_same_error() {
     let folder = folder();
-    folder.run(&SMALL).assert(0, &[]);
+    folder.run(&small()).assert(0, &[]);
     let first = json(&folder, "results.json");
-    folder.run(&with(&SMALL, &["--redo", "--depth=8"])).assert(0, &[]);
+    folder.run(&with(&small(), &["--redo", "--depth=8"])).assert(0, &[]);
     let kept = changed(&folder, "runs/yard/mis-6spp-seed1.json");
     assert_eq!(json(&folder, "results.json")["runs"], first["runs"], "nothing was redone");
     fs::remove_dir_all(folder.path().join("report/runs")).unwrap();
-    folder.run(&SMALL).assert(0, &[]);
+    folder.run(&small()).assert(0, &[]);
     assert!(changed(&folder, "runs/yard/mis-6spp-seed1.json") > kept);
     let second = json(&folder, "results.json");
     for (a, b) in first["runs"].as_array().unwrap().iter().zip(second["runs"].as_array().unwrap()) {
@@ -293,7 +287,7 @@ fn the_same_seed_has_the_same_error() {
 #[test]
 fn runs_by_time_end() {
     let folder = folder();
-    let options = all_but(&SMALL, &["--spp", "--seeds"]);
+    let options = all_but(&small(), &["--spp", "--seeds"]);
     folder.run(&with(&options, &["--time=30ms", "--seeds=16"])).assert(0, &[]);
     let results = json(&folder, "results.json");
     let runs = results["runs"].as_array().unwrap();
@@ -308,11 +302,11 @@ fn runs_by_time_end() {
 #[test]
 fn finished_runs_are_kept_and_new_ones_added() {
     let folder = folder();
-    folder.run(&SMALL).assert(0, &[]);
+    folder.run(&small()).assert(0, &[]);
     let record = "runs/yard/mis-6spp-seed1.json";
     let before = changed(&folder, record);
     let more = ["--samplers=mis,ris,env", "--seeds=3"];
-    folder.run(&with(&all_but(&SMALL, &["--samplers", "--seeds"]), &more)).assert(0, &[]);
+    folder.run(&with(&all_but(&small(), &["--samplers", "--seeds"]), &more)).assert(0, &[]);
     assert_eq!(changed(&folder, record), before);
     assert_eq!(json(&folder, "results.json")["runs"].as_array().unwrap().len(), 9);
 }
@@ -320,10 +314,10 @@ fn finished_runs_are_kept_and_new_ones_added() {
 #[test]
 fn runs_made_under_other_conditions_are_not_mixed_in() {
     let folder = folder();
-    folder.run(&SMALL).assert(0, &[]);
+    folder.run(&small()).assert(0, &[]);
     let record = "runs/yard/mis-6spp-seed1.json";
     let before = changed(&folder, record);
-    let other = with(&all_but(&SMALL, &["--shadow-rays"]), &["--shadow-rays=3"]);
+    let other = with(&all_but(&small(), &["--shadow-rays"]), &["--shadow-rays=3"]);
     folder.run(&other).assert(1, &["shadow rays: 2 there, 3", "one of 4 such runs", "--redo"]);
     assert_eq!(changed(&folder, record), before);
     folder.run(&with(&other, &["--redo"])).assert(0, &[]);
@@ -335,16 +329,10 @@ fn runs_made_under_other_conditions_are_not_mixed_in() {
 #[test]
 fn overhead_is_measured_in_rounds() {
     let folder = folder();
-    let options = [
-        "study",
-        "yard.toml",
-        "--samplers=mis,ris,ris:candidates=8",
-        "--overhead",
-        "--repetitions=3",
-        "-o",
-        "report",
-        "--quiet",
-    ];
+    let options = words(
+        "study yard.toml --samplers=mis,ris,ris:candidates=8 --overhead --repetitions=3 -o report \
+         --quiet",
+    );
     folder.run(&options).assert(0, &[]);
     let results = json(&folder, "results.json");
     assert_eq!(results["rounds"].as_array().unwrap().len(), 3);
@@ -402,21 +390,12 @@ fn an_interrupted_study_keeps_its_runs_and_continues() {
 /// uninterrupted render.
 #[cfg(unix)]
 fn interrupt_reference(sampler: &str) {
-    let reference_sampler = format!("--reference-sampler={sampler}");
     let folder = folder();
-    let options = [
-        "study",
-        "yard.toml",
-        "--samplers=mis",
-        "--spp=1",
-        "--seeds=1",
-        "--reference-spp=24000",
-        "--depth=1",
-        "--shadow-rays=5",
-        &reference_sampler,
-        "-o",
-        "report",
-    ];
+    let options = format!(
+        "study yard.toml --samplers=mis --spp=1 --seeds=1 --reference-spp=24000 --depth=1 \
+         --shadow-rays=5 --reference-sampler={sampler} -o report"
+    );
+    let options = words(&options);
     let running = Running::start(folder.path(), &options, "yard: reference 1 of 2");
     std::thread::sleep(std::time::Duration::from_millis(300));
     running.interrupt().assert(130, &[]);
@@ -432,20 +411,11 @@ fn interrupt_reference(sampler: &str) {
     folder.run(&options).assert(0, &[]);
     assert!(!checkpoint.exists());
     let seed = u32::MAX - 1;
-    let whole = [
-        "render",
-        "yard.toml",
-        "--spp=12000",
-        "--depth=1",
-        "--shadow-rays=5",
-        &format!("--seed={seed}"),
-        "--aov=variance",
-        &format!("--sampler={sampler}"),
-        "-o",
-        "whole.exr",
-        "--quiet",
-    ];
-    folder.run(&whole).assert(0, &[]);
+    let whole = format!(
+        "render yard.toml --spp=12000 --depth=1 --shadow-rays=5 --seed={seed} --aov=variance \
+         --sampler={sampler} -o whole.exr --quiet"
+    );
+    folder.run(&words(&whole)).assert(0, &[]);
     let image = |path: &Path| Image::read_exr(path).unwrap().channels;
     assert_eq!(image(&images.join("reference_1.exr")), image(&folder.path().join("whole.exr")));
 }
@@ -570,7 +540,7 @@ fn a_folder_that_holds_something_else_is_refused() {
     let folder = folder();
     fs::create_dir(folder.path().join("report")).unwrap();
     folder.write("report/thesis.txt", "precious");
-    folder.run(&SMALL).assert(1, &["error: report: ", "something else", "thesis.txt", "-o"]);
+    folder.run(&small()).assert(1, &["error: report: ", "something else", "thesis.txt", "-o"]);
     assert_eq!(fs::read_dir(folder.path().join("report")).unwrap().count(), 1);
     folder.write("file", "precious");
     let options = ["study", "yard.toml", "--spp=2", "-o", "file"];
@@ -619,17 +589,8 @@ fn references_can_be_given() {
     assert!(single["relmse"].is_null());
 
     // Take the references of another study.
-    folder
-        .run(&[
-            "study",
-            "yard.toml",
-            "--samplers=ris",
-            "--spp=2",
-            "--reference=report",
-            "-o",
-            "more",
-        ])
-        .assert(0, &[]);
+    let more = words("study yard.toml --samplers=ris --spp=2 --reference=report -o more");
+    folder.run(&more).assert(0, &[]);
     let results: Value = folder.json("more/results.json");
     assert_eq!(results["scenes"][0]["reference"]["mean"], own["mean"]);
 }
@@ -700,17 +661,9 @@ fn references_that_do_not_fit_are_refused() {
 #[test]
 fn a_sampler_below_the_references_noise_is_not_judged() {
     let folder = folder();
-    let options = [
-        "study",
-        "yard.toml",
-        "--samplers=mis,ris",
-        "--spp=64",
-        "--seeds=1",
-        "--reference-spp=2",
-        "-o",
-        "report",
-        "--quiet",
-    ];
+    let options = words(
+        "study yard.toml --samplers=mis,ris --spp=64 --seeds=1 --reference-spp=2 -o report --quiet",
+    );
     folder.run(&options).assert(0, &[]);
     let results = json(&folder, "results.json");
     let summary = &results["summaries"][1];
@@ -725,16 +678,16 @@ fn a_sampler_below_the_references_noise_is_not_judged() {
 #[cfg(target_os = "linux")]
 fn no_space_is_an_error_and_finished_runs_stay() {
     let folder = folder();
-    folder.run(&SMALL).assert(0, &[]);
+    folder.run(&small()).assert(0, &[]);
     let record = "runs/yard/mis-6spp-seed1.json";
     let before = changed(&folder, record);
     let mut study = program(folder.path());
     c_library::fail_in(&mut study, folder.path(), ("FAULTY_BYTES", 512));
-    study.args(SMALL.iter().map(|o| if o.starts_with("--seeds") { "--seeds=3" } else { o }));
+    study.args(small().iter().map(|o| if o.starts_with("--seeds") { "--seeds=3" } else { o }));
     let run = Run::of(&study.output().unwrap());
     run.assert(75, &["error: report/", ": cannot write: No space left on device"]);
     assert_eq!(changed(&folder, record), before);
     let results = json(&folder, "results.json");
     assert_eq!(results["runs"].as_array().unwrap().len(), 4, "the old results stand");
-    folder.run(&SMALL).assert(0, &[]);
+    folder.run(&small()).assert(0, &[]);
 }

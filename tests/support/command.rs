@@ -159,6 +159,11 @@ pub fn roofed_ball() -> String {
     format!("{BALL}\nmaterial = \"clay\"\n\n[[object]]\n{roof}")
 }
 
+/// Arguments of a line without quotes.
+pub fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
 /// Encodes a PFM map of these texels.
 pub fn pfm([width, height]: [usize; 2], texels: &[[f32; 3]]) -> Vec<u8> {
     let values = texels.as_flattened().iter().flat_map(|value| value.to_le_bytes());
