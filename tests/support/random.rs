@@ -4,18 +4,9 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-/// SplitMix64 generator (Steele, Lea and Flood 2014), started from a seed.
-pub struct Random(pub u64);
+pub use super::fuzz::Random;
 
 impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
     /// Draws a number in [0, 1) with 53 random bits.
     pub fn uniform(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64

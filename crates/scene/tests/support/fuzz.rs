@@ -56,8 +56,8 @@ pub struct Target {
     pub parse: fn(&Path, &[u8]) -> bool,
 }
 
-/// SplitMix64 (Steele et al. 2014).
-pub struct Random(u64);
+/// SplitMix64 generator (Steele, Lea and Flood 2014), started from a seed.
+pub struct Random(pub u64);
 
 impl Random {
     /// Starts the numbers of one case.
@@ -71,7 +71,8 @@ impl Random {
         random
     }
 
-    fn bits(&mut self) -> u64 {
+    /// Draws 64 bits.
+    pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
