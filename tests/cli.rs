@@ -175,26 +175,10 @@ fn a_full_disk_is_reported() {
 #[test]
 fn a_closed_output_is_no_failure() {
     let folder = images();
-    let mut child = program(folder.path())
-        .args(["compare", "b.exr", "a.exr"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    drop(child.stdout.take());
-    Run::of(&child.wait_with_output().unwrap()).assert(0, &[]);
-}
-
-#[test]
-fn a_closed_output_of_devices_is_no_failure() {
-    for options in [&["devices"][..], &["devices", "--json"]] {
-        let mut child = program(Folder::new().path())
-            .current_dir("/")
-            .args(options)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+    for options in [&["compare", "b.exr", "a.exr"][..], &["devices"], &["devices", "--json"]] {
+        let mut command = program(folder.path());
+        command.args(options).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
         drop(child.stdout.take());
         Run::of(&child.wait_with_output().unwrap()).assert(0, &[]);
     }
