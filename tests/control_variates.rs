@@ -72,6 +72,11 @@ fn queries(count: u32) -> Vec<Query> {
     (0..count).map(query).collect()
 }
 
+fn own(control_share: f32, control_bits: bool, control_choice: bool) -> ControlVariatesParameters {
+    let others = ControlVariatesParameters::default();
+    ControlVariatesParameters { control_share, control_bits, control_choice, ..others }
+}
+
 fn is_close(a: [f32; 3], b: Vec3) -> bool {
     (Vec3::from(a) - b).abs().max_element() <= 1e-3 * (1.0 + b.abs().max_element())
 }
@@ -86,12 +91,7 @@ fn the_shader_agrees() {
     for (control_share, control_bits, control_choice, side) in
         [(1.0, true, true, 16), (0.6, false, true, 5), (1.0, false, false, 32)]
     {
-        let own = ControlVariatesParameters {
-            control_share,
-            control_bits,
-            control_choice,
-            ..ControlVariatesParameters::default()
-        };
+        let own = own(control_share, control_bits, control_choice);
         let grid = RecordGrid { side, edge_per_distance: 0.1, largest_edge: 0.9 };
         let control = [
             (CONSTANT_CONTROL_SHARE, control_share.to_bits()),
@@ -140,12 +140,7 @@ fn the_mean_is_the_light_of_the_visible_candidates() {
     for (control_share, control_bits, control_choice) in
         [(1.0, true, true), (1.0, true, false), (0.5, false, true), (0.0, false, true)]
     {
-        let own = ControlVariatesParameters {
-            control_share,
-            control_bits,
-            control_choice,
-            ..ControlVariatesParameters::default()
-        };
+        let own = own(control_share, control_bits, control_choice);
         let outcomes: Vec<Controlled> = (0..NUMBERS)
             .map(|index| choose(&own, &candidates, (index as f32 + 0.5) / NUMBERS as f32))
             .collect();

@@ -31,6 +31,12 @@ fn settings(sampler: Sampler, seed: u32) -> Settings {
     Settings { sampler, seed, shadow_rays: 2, ..Settings::default() }
 }
 
+/// Settings of `guided` without choices by measurement.
+fn guided() -> Settings {
+    let parameters = support::parameters(&["candidates=1", "share-paths=off"]);
+    Settings { parameters, ..settings(Sampler::Guided, 3) }
+}
+
 /// Numbers of rays that the guide has counted, those since the last rebuild included.
 fn counted(renderer: &Renderer) -> u64 {
     let state = renderer.guide_state().unwrap().unwrap();
@@ -63,10 +69,7 @@ fn a_moved_camera_sees_what_a_new_renderer_sees() {
 fn a_pass_that_is_stopped_leaves_no_trace_after_the_next_look() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
-    let mut settings = settings(Sampler::Guided, 3);
-    settings.parameters.set("candidates=1").unwrap();
-    settings.parameters.set("share-paths=off").unwrap();
-    let mut renderer = support::renderer(&scene, settings.clone());
+    let mut renderer = support::renderer(&scene, guided());
     let stops = Rc::new(Cell::new(true));
     let watched = Rc::clone(&stops);
     renderer.set_watch(Box::new(move |_| watched.get()));
@@ -76,20 +79,14 @@ fn a_pass_that_is_stopped_leaves_no_trace_after_the_next_look() {
     renderer.look(&scene.camera, [32, 24], 3, true).unwrap();
     renderer.render_pass(2).unwrap();
     assert!(!renderer.is_stopped() && renderer.sample_count() == 2);
-    let mut other = support::renderer(&scene, settings);
-    other.render_pass(2).unwrap();
-    assert!(renderer.sums().unwrap().sum == other.sums().unwrap().sum);
-    support::assert_silent();
+    assert!(renderer.sums().unwrap().sum == support::render(&scene, guided(), 2).0.sum);
 }
 
 #[test]
 fn what_guided_has_learned_stays() {
     let _alone = support::alone();
     let scene = scenes::mixed_room();
-    let mut settings = settings(Sampler::Guided, 3);
-    settings.parameters.set("candidates=1").unwrap();
-    settings.parameters.set("share-paths=off").unwrap();
-    let mut renderer = support::renderer(&scene, settings);
+    let mut renderer = support::renderer(&scene, guided());
     renderer.render_pass(4).unwrap();
     let before = counted(&renderer);
     renderer.look(&elsewhere(&scene), [16, 12], 4, false).unwrap();
