@@ -345,28 +345,14 @@ fn samples_follow_their_density() {
             (mass + lost - 1.0).abs() < 0.01,
             "{name} at {angle}°: the density integrates to {mass}, {lost} fall below the surface"
         );
-        // Merge all bins that expect less than one count: a bin almost wholly below the surface may
-        // have no point of the quadrature above it.
-        let is_small = |mass: f64| mass * f64::from(SAMPLES) < 1.0;
-        let mut expected = vec![0.0];
-        let mut counts = vec![0.0];
-        for (&count, &mass) in observed.iter().zip(&bins.masses) {
-            if is_small(mass) {
-                counts[0] += count;
-                expected[0] += mass;
-            } else {
-                counts.push(count);
-                expected.push(mass);
-            }
-        }
-        let rest = (counts[0], expected[0] * f64::from(SAMPLES));
+        // A bin almost wholly below the surface may have no point of the quadrature above it.
+        let ([counts, expected], [few, few_expected]) =
+            statistics::part_rare_bins(&observed, &bins.masses, SAMPLES);
         assert!(
-            rest.0 <= rest.1 + 6.0 * rest.1.max(1.0).sqrt(),
-            "{name} at {angle}°: {} samples where {} are expected",
-            rest.0,
-            rest.1
+            few <= few_expected + 6.0 * few_expected.max(1.0).sqrt(),
+            "{name} at {angle}°: {few} samples where {few_expected} are expected"
         );
-        let p_value = statistics::chi_square_p_value(&counts[1..], &expected[1..]);
+        let p_value = statistics::chi_square_p_value(&counts, &expected);
         assert!(p_value > 1e-5, "{name} at {angle}°: p = {p_value:e}");
     });
 }

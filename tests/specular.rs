@@ -267,17 +267,8 @@ fn samples_follow_their_density() {
         let mass: f64 = masses.iter().sum();
         assert!((mass + lost - 1.0).abs() < 0.01, "{name}: ∫ pdf = {mass}, {lost} lost");
         // Bins at the edge of the refracted cone may have no point of the quadrature inside it.
-        let (mut counts, mut expected) = (vec![], vec![]);
-        let (mut few, mut few_expected) = (0.0, 0.0);
-        for (count, mass) in observed.into_iter().zip(masses) {
-            if mass * f64::from(SAMPLES) < 1.0 {
-                few += count;
-                few_expected += mass * f64::from(SAMPLES);
-            } else {
-                counts.push(count);
-                expected.push(mass);
-            }
-        }
+        let ([counts, expected], [few, few_expected]) =
+            statistics::part_rare_bins(&observed, &masses, SAMPLES);
         assert!(
             few <= few_expected + 1e-3 * f64::from(SAMPLES),
             "{name}: {few} samples where {few_expected} are expected"

@@ -46,6 +46,22 @@ pub fn chi_square_p_value(observed: &[f64], expected: &[f64]) -> f64 {
     upper_incomplete_gamma(0.5 * (pools.len() - 1) as f64, 0.5 * statistic)
 }
 
+/// Parts the bins that expect less than one of `samples` counts, of which a quadrature may see nothing:
+/// returns the counts and masses of the others, and how many counts the parted ones have and expect.
+pub fn part_rare_bins(observed: &[f64], masses: &[f64], samples: u32) -> ([Vec<f64>; 2], [f64; 2]) {
+    let samples = f64::from(samples);
+    let (mut others, mut rare) = ([vec![], vec![]], [0.0; 2]);
+    for (count, mass) in observed.iter().zip(masses) {
+        if mass * samples < 1.0 {
+            rare = [rare[0] + count, rare[1] + mass * samples];
+        } else {
+            others[0].push(*count);
+            others[1].push(*mass);
+        }
+    }
+    (others, rare)
+}
+
 /// Returns the two-sided p-value of a standard normal `z`.
 pub fn z_p_value(z: f64) -> f64 {
     upper_incomplete_gamma(0.5, 0.5 * z * z)
