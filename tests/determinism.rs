@@ -100,10 +100,8 @@ fn a_resumed_render_equals_an_uninterrupted_one() {
     for sampler in WITHOUT_LEARNING {
         let uninterrupted = render(settings(sampler), &[5]);
         let half = render(settings(sampler), &[2]);
-        let mut renderer = renderer(&scene(), settings(sampler));
-        renderer.restore(&half).unwrap();
-        renderer.render_pass(3).unwrap();
-        assert!(renderer.sums().unwrap() == uninterrupted, "{} differs", sampler.name());
+        let resumed = support::resume(&scene(), settings(sampler), &half, 3);
+        assert!(resumed == uninterrupted, "{} differs", sampler.name());
     }
 }
 
@@ -121,10 +119,8 @@ fn pages_of_the_film_make_no_difference() {
         assert!(render(pages.clone(), &[2, 3]) == whole, "{} differs", sampler.name());
         if sampler == Sampler::Mis {
             let half = render(pages.clone(), &[2]);
-            let mut resumed = renderer(&scene(), pages);
-            resumed.restore(&half).unwrap();
-            resumed.render_pass(3).unwrap();
-            assert!(resumed.sums().unwrap() == whole, "the resumed film differs");
+            let resumed = support::resume(&scene(), pages, &half, 3);
+            assert!(resumed == whole, "the resumed film differs");
         }
     }
 }

@@ -101,9 +101,7 @@ fn surfaces_are_shown_in_mirrors_and_through_glass() {
         assert!(normal.contains(&found[1].y), "{kind:?}: {found:?}");
         let is_pane = matches!(kind, MaterialKind::ThinDielectric { .. });
         assert!(is_pane || (found[2].y - 1.5).abs() < 1e-3, "{kind:?}: {found:?}");
-        let mut one_by_one = renderer(&scene, settings);
-        (0..8).for_each(|_| one_by_one.render_pass(1).unwrap());
-        assert!(one_by_one.sums().unwrap() == sums, "{kind:?}");
+        assert!(support::render_passes(&scene, settings, &[1; 8]) == sums, "{kind:?}");
     }
 }
 
@@ -167,17 +165,12 @@ fn mattes_are_the_shares_of_objects_and_materials() {
             assert!(image.channels[&format!("{layer}02.A")].iter().all(|share| *share == 0.0));
         }
         // Neither the grouping of samples nor a window nor a break changes a count.
-        let mut grouped = renderer(&scene, settings.clone());
-        [1, 100, 27].iter().for_each(|samples| grouped.render_pass(*samples).unwrap());
-        assert!(grouped.sums().unwrap() == sums);
+        assert!(support::render_passes(&scene, settings.clone(), &[1, 100, 27]) == sums);
         let window = Some(Window { x: 7, y: 2, width: 3, height: 4 });
         let (part, _) = render(&scene, Settings { window, ..settings.clone() }, 128);
         assert_eq!(part.objects[4], sums.objects[3 * 16 + 8]);
         let (mut first, _) = render(&scene, settings.clone(), 28);
-        let mut resumed = renderer(&scene, settings.clone());
-        resumed.restore(&first).unwrap();
-        resumed.render_pass(100).unwrap();
-        assert!(resumed.sums().unwrap() == sums);
+        assert!(support::resume(&scene, settings.clone(), &first, 100) == sums);
         first.add(&render(&scene, Settings { first_sample: 28, ..settings.clone() }, 100).0);
         let added = first.to_image(&aovs);
         for (name, values) in image.channels.iter().filter(|(name, _)| name.starts_with("Crypto")) {
@@ -238,10 +231,7 @@ fn entries_are_kept_by_checkpoints_and_add_up() {
     let scene = room();
     let (whole, _) = render(&scene, visibility(&[]), 7);
     let (first, _) = render(&scene, visibility(&[]), 3);
-    let mut resumed = renderer(&scene, visibility(&[]));
-    resumed.restore(&first).unwrap();
-    resumed.render_pass(4).unwrap();
-    assert!(resumed.sums().unwrap() == whole);
+    assert!(support::resume(&scene, visibility(&[]), &first, 4) == whole);
     let (rest, _) = render(&scene, Settings { first_sample: 3, ..visibility(&[]) }, 4);
     let mut added = first;
     added.add(&rest);

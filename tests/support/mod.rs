@@ -163,6 +163,14 @@ pub fn render_passes(scene: &Scene, settings: Settings, passes: &[u32]) -> Sums 
     renderer.sums().unwrap()
 }
 
+/// Goes on from `first` with `samples` samples per pixel and returns the sums.
+pub fn resume(scene: &Scene, settings: Settings, first: &Sums, samples: u32) -> Sums {
+    let mut renderer = renderer(scene, settings);
+    renderer.restore(first).unwrap();
+    renderer.render_pass(samples).unwrap();
+    renderer.sums().unwrap()
+}
+
 /// Fails if the validation layers have said anything since the device was opened.
 pub fn assert_silent() {
     let messages = device().validation_messages();
@@ -183,8 +191,8 @@ pub fn spirv(name: &str) -> Vec<u8> {
     fs::read(format!("{}/test/{name}.spv", env!("OUT_DIR"))).unwrap()
 }
 
-/// Runs a probe kernel over `queries` with specialization constants and with buffers of the scene, and returns
-/// its answer to each.
+/// Runs a probe kernel over `queries` with specialization constants and with buffers of the scene, and
+/// returns its answer to each.
 pub fn run_probe<Q: Pod, A: Pod>(
     kernel: &str,
     constants: &[(u32, u32)],
