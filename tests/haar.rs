@@ -155,7 +155,7 @@ impl Paths {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
             let sets = [self.scene.set(), self.nodes.set(), self.waves.set()];
-            pass.record(&mut commands, &sets, &self.wave);
+            pass.record(&mut commands, &sets, &self.wave, None);
             commands.submit_and_wait().unwrap();
         }
         support::assert_silent();

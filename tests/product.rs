@@ -221,7 +221,7 @@ impl Paths {
         for kernel in kernels {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
-            pass.record(&mut commands, &sets, &self.wave);
+            pass.record(&mut commands, &sets, &self.wave, None);
             commands.submit_and_wait().unwrap();
         }
     }

@@ -81,9 +81,9 @@ fn write_exr(path: &Path, channels: Vec<(&str, FlatSamples)>) {
 #[test]
 fn every_format_gives_the_same_map_with_the_first_row_on_top() {
     let folder = Folder::new();
-    let mut paths = vec![folder.write("map.hdr", &hdr_bytes(8, 4, &texels()))];
+    let mut paths = vec![folder.write("map.hdr", hdr_bytes(8, 4, &texels()))];
     for (name, big_endian) in [("little.pfm", false), ("big.PFM", true)] {
-        paths.push(folder.write(name, &pfm_bytes(8, 4, &texels(), big_endian, false)));
+        paths.push(folder.write(name, pfm_bytes(8, 4, &texels(), big_endian, false)));
     }
     let component = |c: usize| texels().iter().map(move |texel| texel[c]).collect::<Vec<f32>>();
     let half = |c: usize| component(c).into_iter().map(half::f16::from_f32).collect::<Vec<_>>();
@@ -117,7 +117,7 @@ fn grey_files_give_grey_maps() {
     let folder = Folder::new();
     let grey: Vec<Vec3> = texels().iter().map(|texel| Vec3::splat(texel.x)).collect();
     for big_endian in [false, true] {
-        let path = folder.write("grey.pfm", &pfm_bytes(8, 4, &texels(), big_endian, true));
+        let path = folder.write("grey.pfm", pfm_bytes(8, 4, &texels(), big_endian, true));
         assert_eq!(load(&path).0.texels, grey);
     }
     let path = folder.path().join("grey.exr");
@@ -128,7 +128,7 @@ fn grey_files_give_grey_maps() {
 #[test]
 fn scale_and_rotation_are_applied() {
     let folder = Folder::new();
-    let path = folder.write("map.hdr", &hdr_bytes(8, 4, &texels()));
+    let path = folder.write("map.hdr", hdr_bytes(8, 4, &texels()));
     let map = EnvironmentMap::load(&path, 2.5, -270.0, &mut Vec::new()).unwrap();
     assert_eq!(map.texels[3], texel(3) * 2.5);
     assert!((map.rotation_rad - std::f32::consts::FRAC_PI_2).abs() < 1e-6);
@@ -149,7 +149,7 @@ fn texels_that_are_not_radiance_become_black_and_are_counted() {
     broken[6].z = f32::INFINITY;
     broken[31] = Vec3::NEG_INFINITY;
     broken[30].x = 1e30;
-    let path = folder.write("broken.pfm", &pfm_bytes(8, 4, &broken, false, false));
+    let path = folder.write("broken.pfm", pfm_bytes(8, 4, &broken, false, false));
     let (map, warnings) = load(&path);
     assert_eq!(warnings.len(), 1, "{warnings:?}");
     assert!(warnings[0].contains("5 of 32 texels"), "{warnings:?}");
@@ -162,7 +162,7 @@ fn texels_that_are_not_radiance_become_black_and_are_counted() {
 #[test]
 fn other_ratios_are_warned_of() {
     let folder = Folder::new();
-    let path = folder.write("square.pfm", &pfm_bytes(4, 8, &texels(), false, false));
+    let path = folder.write("square.pfm", pfm_bytes(4, 8, &texels(), false, false));
     let (map, warnings) = load(&path);
     assert!(warnings.len() == 1 && warnings[0].contains("4×8"), "{warnings:?}");
     assert!((EnvironmentTables::new(&map).total).is_normal());
@@ -229,7 +229,7 @@ fn a_header_that_promises_more_than_the_file_holds_is_refused() {
     assert!(message.contains("its header promises 16384x8192 pixels"), "{message}");
     // A flat map of the largest size is compressed most, and is still read.
     let flat = vec![Vec3::ONE; 8192 * 64];
-    let path = folder.write("flat.hdr", &hdr_bytes(8192, 64, &flat));
+    let path = folder.write("flat.hdr", hdr_bytes(8192, 64, &flat));
     assert_eq!(load(&path).0.texels, flat);
 }
 
