@@ -24,7 +24,7 @@ pub struct Recording<'a> {
     times: PassTimes,
     host: Option<Host<'a>>,
     ends: bool,
-    /// Most paths of the lists from here on: those of the last question.
+    /// Most paths of the lists from here on: those whose rays the vertex began with.
     most_listed: Option<u32>,
 }
 
@@ -62,7 +62,10 @@ impl<'a> Recording<'a> {
             if may_end && !answers.has_rays(wave)? {
                 return Ok(false);
             }
-            self.most_listed = Some(tracer.answer(question, wave, answers)?);
+            let walked = tracer.answer(question, wave, answers)?;
+            if question == Question::Closest {
+                self.most_listed = Some(walked);
+            }
             let ms = start.elapsed().as_secs_f64() * 1e3;
             *self.times.entry(pass.kernel().shader.to_owned()).or_default() += ms;
         }
