@@ -16,12 +16,8 @@ pub(super) enum Input {
     Set(Setting),
     /// Directions to fly to changed: right, up, forward, −1 to 1 each.
     Held([f32; 3]),
-    /// The pointer moved with the first button held, in heights of the window.
-    Orbit([f32; 2]),
-    /// The pointer moved with the second button held.
-    Turn([f32; 2]),
-    /// The pointer moved with the third button held.
-    Pan([f32; 2]),
+    /// The pointer moved with a button held, in heights of the window.
+    Drag(Drag, [f32; 2]),
     /// The wheel turned, notches away from the user.
     Wheel(f32),
     /// The pointer is at this pixel of the window.
@@ -49,10 +45,18 @@ impl Input {
                 matches!(setting, Setting::FieldOfView(_) | Setting::Aperture(_) | Setting::View(_))
             }
             Self::Held(direction) => *direction != [0.0; 3],
-            Self::Orbit(_) | Self::Turn(_) | Self::Pan(_) | Self::Wheel(_) | Self::Close => true,
+            Self::Drag(..) | Self::Wheel(_) | Self::Close => true,
             _ => false,
         }
     }
+}
+
+/// Effect of the pointer while a button is held: the first, the second, the third.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Drag {
+    Orbit,
+    Turn,
+    Pan,
 }
 
 /// Value of a control.

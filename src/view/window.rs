@@ -27,7 +27,7 @@ use super::{
     controls::{self, Controls},
     inset,
     keys::{Action, action_of},
-    message::{Input, Status},
+    message::{Drag, Input, Status},
     panel::Panel,
     projector::Projector,
     side::Side,
@@ -160,14 +160,6 @@ struct App {
     pressed: Option<[f64; 2]>,
 }
 
-/// Effect of the pointer while a button is held.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Drag {
-    Orbit,
-    Turn,
-    Pan,
-}
-
 impl App {
     fn send(&self, input: Input) {
         // A thread that has ended reports so.
@@ -292,9 +284,7 @@ impl App {
             None if self.controls.wants_pointer() => return,
             None => Input::Pointer(to),
             Some(_) if way == [0.0; 2] => return,
-            Some(Drag::Orbit) => Input::Orbit(way),
-            Some(Drag::Turn) => Input::Turn(way),
-            Some(Drag::Pan) => Input::Pan(way),
+            Some(drag) => Input::Drag(*drag, way),
         };
         self.send(input);
     }

@@ -13,7 +13,7 @@ use crate::{
     view::{
         inset,
         keys::{Action, LAYERS},
-        message::{Input, Setting},
+        message::{Drag, Input, Setting},
         projector::Inset,
         save::{Saved, camera_toml, names, read_camera, views},
         side::Side,
@@ -28,41 +28,24 @@ const NOTCH: f32 = 0.88;
 impl Worker {
     /// Acts on input between passes. Returns true if the camera has moved.
     pub(super) fn apply(&mut self, input: Input) -> Result<bool> {
-        let action = match input {
-            Input::Held(direction) => {
-                self.held = direction.into();
-                return Ok(false);
-            }
-            Input::Orbit([x, y]) => {
-                self.rig.orbit(-TURN * x, TURN * y);
-                return Ok(true);
-            }
-            Input::Turn([x, y]) => {
-                self.rig.turn(TURN * x, -TURN * y);
-                return Ok(true);
-            }
-            Input::Pan([x, y]) => {
-                self.rig.pan(-x, y);
-                return Ok(true);
-            }
-            Input::Wheel(notches) => {
-                self.rig.zoom(NOTCH.powf(notches));
-                return Ok(true);
-            }
-            Input::Pointer(_) => {
-                self.update_inset()?;
-                return Ok(false);
-            }
-            Input::Focus(at) => {
-                self.clicked = Some(at);
-                return Ok(false);
-            }
+        let has_moved = matches!(input, Input::Drag(..) | Input::Wheel(_));
+        match input {
+            Input::Key(action) => return self.act(action),
             Input::Set(setting) => return self.set(setting),
-            Input::Key(action) => action,
-            Input::Resized(_) | Input::Redraw | Input::Close | Input::Overlay(_) => {
-                return Ok(false);
-            }
-        };
+            Input::Drag(Drag::Orbit, [x, y]) => self.rig.orbit(-TURN * x, TURN * y),
+            Input::Drag(Drag::Turn, [x, y]) => self.rig.turn(TURN * x, -TURN * y),
+            Input::Drag(Drag::Pan, [x, y]) => self.rig.pan(-x, y),
+            Input::Wheel(notches) => self.rig.zoom(NOTCH.powf(notches)),
+            Input::Held(direction) => self.held = direction.into(),
+            Input::Pointer(_) => self.update_inset()?,
+            Input::Focus(at) => self.clicked = Some(at),
+            Input::Resized(_) | Input::Redraw | Input::Close | Input::Overlay(_) => {}
+        }
+        Ok(has_moved)
+    }
+
+    /// Acts on a key. Returns true if the camera has moved.
+    fn act(&mut self, action: Action) -> Result<bool> {
         match action {
             Action::Sampler(number) => self.choose_sampler(number)?,
             Action::Depth(more) => {
@@ -74,8 +57,7 @@ impl Worker {
             }
             Action::Split => {
                 if self.right.take().is_none() {
-                    let side = self.make_side(self.right_sampler)?;
-                    self.right = Some(side);
+                    self.right = Some(self.make_side(self.right_sampler)?);
                 } else {
                     self.chooses_right = false;
                 }
@@ -209,8 +191,7 @@ impl Worker {
         if self.chooses_right {
             self.right_sampler = sampler;
             self.right = None;
-            let side = self.make_side(sampler)?;
-            self.right = Some(side);
+            self.right = Some(self.make_side(sampler)?);
         } else if sampler != self.parts.left.sampler {
             self.keep_guide()?;
             self.parts.left = self.make_side(sampler)?;
@@ -223,8 +204,7 @@ impl Worker {
         self.keep_guide()?;
         self.parts.left = self.make_side(self.parts.left.sampler)?;
         if self.right.take().is_some() {
-            let side = self.make_side(self.right_sampler)?;
-            self.right = Some(side);
+            self.right = Some(self.make_side(self.right_sampler)?);
         }
         self.look(self.whole(), true)
     }
