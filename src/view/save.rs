@@ -16,7 +16,7 @@ use crate::{
 const MOST_VIEWS: u32 = 99;
 
 /// Returns a camera as the table of a scene file.
-pub(crate) fn camera_toml(camera: &Camera) -> String {
+pub(super) fn camera_toml(camera: &Camera) -> String {
     // Shortest decimals that read back as the same numbers.
     let vector = |value: glam::Vec3| format!("[{:?}, {:?}, {:?}]", value.x, value.y, value.z);
     let mut text = format!(
@@ -98,25 +98,17 @@ pub(super) fn read_camera(path: &Path) -> Result<Camera> {
     }
 }
 
-/// Content of the three files.
-pub(crate) struct Saved<'a> {
-    /// Width and height of the window, pixels.
-    pub size: [u32; 2],
-    /// Pixels of the window.
-    pub pixels: &'a [[u8; 3]],
-    /// The film to the left, with its metadata.
-    pub film: &'a Image,
-    pub camera: &'a Camera,
-}
-
-impl Saved<'_> {
-    /// Writes the files.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`] with the cause.
-    pub(crate) fn write(&self, [png, exr, toml]: &[PathBuf; 3]) -> Result<()> {
-        write_rgb8(png, self.size[0], self.size[1], self.pixels)?;
-        self.film.write_exr(exr)?;
-        write_text(toml, &camera_toml(self.camera))
-    }
+/// Writes size and pixels of the window, the film to the left with its metadata, and the camera.
+///
+/// # Errors
+/// [`crate::Error::Io`] with the cause.
+pub(super) fn write(
+    [png, exr, toml]: &[PathBuf; 3],
+    (size, pixels): ([u32; 2], &[[u8; 3]]),
+    film: &Image,
+    camera: &Camera,
+) -> Result<()> {
+    write_rgb8(png, size[0], size[1], pixels)?;
+    film.write_exr(exr)?;
+    write_text(toml, &camera_toml(camera))
 }

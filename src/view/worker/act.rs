@@ -15,7 +15,7 @@ use crate::{
         keys::{Action, LAYERS},
         message::{Drag, Input, Setting},
         projector::Inset,
-        save::{Saved, camera_toml, names, read_camera, views},
+        save::{camera_toml, names, read_camera, views, write},
         side::Side,
     },
 };
@@ -264,10 +264,8 @@ impl Worker {
         }
         let (size, pixels) = self.parts.panel.borrow_mut().picture()?;
         let film = self.parts.left.session.image(&[])?;
-        let camera = &self.rig.camera;
         let files = names(&self.parts.folder, &self.parts.scene.name);
-        let saved = Saved { size, pixels: &pixels, film: &film, camera };
-        let written = saved.write(&files);
+        let written = write(&files, (size, &pixels), &film, &self.rig.camera);
         self.notice_written(written, &files);
         Ok(())
     }
