@@ -12,12 +12,13 @@ use std::{
 use super::{
     keys::Action,
     message::{Input, Setting},
-    projector::{Overlay, Place, Projector, is_picture},
+    projector::{Overlay, Place, Projector},
 };
 use crate::{
     error::{Error, Result},
     film::{Tone, tone::auto_exposure},
     gpu::{Device, Presented, Swapchain, swapchain::Target},
+    shader::constants::SHOW_PICTURE,
 };
 
 pub(crate) struct Panel {
@@ -140,7 +141,7 @@ impl Panel {
 
     /// Sets the exposure by the picture to the left.
     fn expose(&mut self) -> Result<()> {
-        if is_picture(self.layer) {
+        if self.layer == SHOW_PICTURE {
             self.tone.exposure = auto_exposure(&self.projector.shown(Place::Left)?);
             self.is_changed = true;
         }
@@ -198,7 +199,7 @@ fn compose(
     layer: u32,
     is_bgra: bool,
 ) -> Result<&crate::gpu::Buffer> {
-    // Colours of layers are shown as they are.
-    let tone = if is_picture(layer) { tone } else { Tone::default() };
+    // Exposure and curve are for the picture; colours of other layers are shown as they are.
+    let tone = if layer == SHOW_PICTURE { tone } else { Tone::default() };
     projector.compose(size, has_right, (tone.exposure.exp2(), tone.curve as u32), is_bgra)
 }

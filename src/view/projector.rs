@@ -8,7 +8,6 @@ use crate::{
     session::Renderer,
     shader::{
         bindings::{VIEW, view},
-        constants::SHOW_PICTURE,
         spirv,
         structs::{ShownFilm, WindowFrame},
     },
@@ -244,11 +243,6 @@ impl Projector {
         };
         Some([at(x, left, width, film[0])?, at(y, top, height, film[1])?])
     }
-}
-
-/// True if `layer` is the picture, to which exposure and curve apply.
-pub(crate) fn is_picture(layer: u32) -> bool {
-    layer == SHOW_PICTURE
 }
 
 /// Returns left and upper edge, width and height of the largest picture of the shape of `film` in the middle
