@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::{
     Aov, GroupSums, Image, Sums,
     cryptomatte::{self, MATERIALS, OBJECTS},
+    layers::TRIPLES,
 };
 
 impl Sums {
@@ -47,20 +48,13 @@ impl Sums {
                 Aov::CacheEntries => {
                     insert_ratio(&mut image, ["CacheEntries.Y", "Hits.Y"], &self.cache_entries);
                 }
-                Aov::Unfiltered => {
-                    let names = ["Unfiltered.R", "Unfiltered.G", "Unfiltered.B"];
-                    insert_means(&mut image, names, &self.unfiltered);
-                }
-                Aov::Albedo => {
-                    insert_means(&mut image, ["Albedo.R", "Albedo.G", "Albedo.B"], &self.albedo);
-                }
-                Aov::Normal => insert_means(&mut image, ["N.X", "N.Y", "N.Z"], &self.normal),
-                Aov::Position => insert_means(&mut image, ["P.X", "P.Y", "P.Z"], &self.position),
-                Aov::GuideCell => {
-                    let names = ["GuideCell.R", "GuideCell.G", "GuideCell.B"];
-                    insert_means(&mut image, names, &self.guide_cell);
-                    let names = ["GuideLevel.R", "GuideLevel.G", "GuideLevel.B"];
-                    insert_means(&mut image, names, &self.guide_level);
+                Aov::Unfiltered | Aov::Albedo | Aov::Normal | Aov::Position | Aov::GuideCell => {
+                    let layers = TRIPLES.iter().zip(self.triples());
+                    for (layer, sums) in layers.filter(|(layer, _)| layer.aov == Some(*aov)) {
+                        // The layer of a checkpoint is called by its mean's name, and a sum.
+                        let names = layer.channels.map(|channel| channel.replace("Sum", ""));
+                        insert_means(&mut image, names.each_ref().map(String::as_str), sums);
+                    }
                 }
                 Aov::LightGroups => {
                     for group in &self.groups {
