@@ -337,28 +337,17 @@ impl Sums {
         );
         // The parts of radiance and of its squares are added.
         for (ours, theirs) in self.triples_mut().into_iter().zip(other.triples()).skip(4) {
-            if theirs.is_empty() {
-                ours.clear();
-            }
-            for (value, more) in ours.as_flattened_mut().iter_mut().zip(theirs.as_flattened()) {
-                *value += more;
-            }
+            add_layer(ours, theirs, |sum, more| {
+                sum.iter_mut().zip(more).for_each(|(value, more)| *value += more);
+            });
         }
         for (ours, theirs) in self.counts_mut().into_iter().zip(other.counts()) {
-            if theirs.is_empty() {
-                ours.clear();
-            }
-            for (value, more) in ours.as_flattened_mut().iter_mut().zip(theirs.as_flattened()) {
-                *value = value.saturating_add(*more);
-            }
+            add_layer(ours, theirs, |count, more| {
+                *count = [0, 1].map(|part| count[part].saturating_add(more[part]));
+            });
         }
         for (ours, theirs) in self.coverages_mut().into_iter().zip(other.coverages()) {
-            if theirs.is_empty() {
-                ours.clear();
-            }
-            for (own, more) in ours.iter_mut().zip(theirs) {
-                add_coverage(own, more);
-            }
+            add_layer(ours, theirs, add_coverage);
         }
         self.groups.retain(|group| other.group(&group.name).is_some());
         for group in &mut self.groups {
@@ -369,6 +358,14 @@ impl Sums {
         }
         self.sample_count = self.sample_count.saturating_add(other.sample_count);
     }
+}
+
+/// Adds a layer pixel by pixel, or drops it where it lacks those of the other.
+fn add_layer<T>(ours: &mut Vec<T>, theirs: &[T], add: impl Fn(&mut T, &T)) {
+    if theirs.is_empty() {
+        ours.clear();
+    }
+    ours.iter_mut().zip(theirs).for_each(|(own, more)| add(own, more));
 }
 
 /// Adds the samples of another coverage of a pixel. Drops those that find no slot left, as the device does.
