@@ -46,33 +46,30 @@ pub struct Conditions {
 impl Conditions {
     /// Lists differing conditions as "name: ours there, theirs asked for".
     pub(crate) fn differences(&self, asked: &Self) -> Vec<String> {
-        let mut found = Vec::new();
-        let mut compare = |what: &str, ours: String, theirs: String| {
-            if ours != theirs {
-                found.push(format!("{what}: {ours} there, {theirs} asked for"));
-            }
+        let facts = |of: &Self| {
+            let parameters = match of.parameters.is_empty() {
+                true => "default".to_owned(),
+                false => assignments(&of.parameters, " "),
+            };
+            [
+                ("version", of.version.clone()),
+                // The first digits tell scenes apart.
+                ("scene hash", of.scene_hash.chars().take(12).collect()),
+                ("film", format!("{}x{}", of.film[0], of.film[1])),
+                ("device", of.device.clone()),
+                ("driver", of.driver.clone()),
+                ("shadow rays", of.shadow_rays.to_string()),
+                ("depth", of.depth.to_string()),
+                ("reference", of.reference.clone()),
+                ("parameters", parameters),
+            ]
         };
-        compare("version", self.version.clone(), asked.version.clone());
-        compare("scene hash", short(&self.scene_hash), short(&asked.scene_hash));
-        let film = |[width, height]: [u32; 2]| format!("{width}x{height}");
-        compare("film", film(self.film), film(asked.film));
-        compare("device", self.device.clone(), asked.device.clone());
-        compare("driver", self.driver.clone(), asked.driver.clone());
-        compare("shadow rays", self.shadow_rays.to_string(), asked.shadow_rays.to_string());
-        compare("depth", self.depth.to_string(), asked.depth.to_string());
-        compare("reference", self.reference.clone(), asked.reference.clone());
-        let parameters = |of: &Self| match of.parameters.is_empty() {
-            true => "default".to_owned(),
-            false => assignments(&of.parameters, " "),
-        };
-        compare("parameters", parameters(self), parameters(asked));
-        found
+        let both = facts(self).into_iter().zip(facts(asked));
+        let differing = both.filter(|(ours, theirs)| ours != theirs);
+        differing
+            .map(|((what, ours), (_, theirs))| format!("{what}: {ours} there, {theirs} asked for"))
+            .collect()
     }
-}
-
-/// Returns the first digits of a hash, which tell scenes apart.
-fn short(hash: &str) -> String {
-    hash.chars().take(12).collect()
 }
 
 /// Joins parameters, written `name=value`.
