@@ -196,22 +196,19 @@ impl Metadata {
     /// that is none of samples alone.
     pub fn load(image: &Image, path: &Path) -> Result<Self> {
         check_film(image, path)?;
+        let refuse = |message: String| Error::format(path, message);
         let text = |name: &str| match image.attributes.get(name) {
             Some(Attribute::Text(value)) => Ok(value.clone()),
-            Some(other) => Err(Error::format(
-                path,
-                format!("attribute {name}: expected text, found {other:?}"),
-            )),
-            None => Err(Error::format(
-                path,
-                format!("no attribute {name}: not an image that Fenestra rendered"),
-            )),
+            Some(other) => Err(refuse(format!("attribute {name}: expected text, found {other:?}"))),
+            None => {
+                Err(refuse(format!("no attribute {name}: not an image that Fenestra rendered")))
+            }
         };
         let number = |name: &str| {
-            text(name)?.parse::<u32>().map_err(|error| {
-                Error::format(path, format!("attribute {name}: expected a number: {error}"))
-            })
+            let expected = |error| refuse(format!("attribute {name}: expected a number: {error}"));
+            text(name)?.parse::<u32>().map_err(expected)
         };
+        let has = |name: &str| image.attributes.contains_key(name);
         let named = |prefix: &'static str| {
             image.attributes.iter().filter_map(move |(name, value)| {
                 name.strip_prefix(prefix).map(|rest| (rest.to_owned(), value))
@@ -235,24 +232,18 @@ impl Metadata {
             .map(SampleRange::from_str)
             .collect::<Result<Vec<_>, _>>()
             .and_then(|ranges| check_ranges(&ranges).map(|()| ranges))
-            .map_err(|message| {
-                Error::format(path, format!("attribute fenestra.sample_ranges: {message}"))
-            })?;
-        let ahead = match image.attributes.contains_key("fenestra.ahead") {
+            .map_err(|message| refuse(format!("attribute fenestra.sample_ranges: {message}")))?;
+        let ahead = match has("fenestra.ahead") {
             true => parse_ahead(&text("fenestra.ahead")?).ok_or_else(|| {
-                Error::format(path, "attribute fenestra.ahead: expected blocks or blocks:x:y")
+                refuse("attribute fenestra.ahead: expected blocks or blocks:x:y".into())
             })?,
             false => Ahead::default(),
         };
         let seconds = image.attributes.get("fenestra.seconds").and_then(double).unwrap_or(0.0);
         if !(0.0..=LONGEST_RENDER).contains(&seconds) {
-            return Err(Error::format(
-                path,
-                format!(
-                    "attribute fenestra.seconds: expected 0 to {LONGEST_RENDER} seconds, found \
-                     {seconds}"
-                ),
-            ));
+            return Err(refuse(format!(
+                "attribute fenestra.seconds: expected 0 to {LONGEST_RENDER} seconds, found {seconds}"
+            )));
         }
         Ok(Self {
             version: text("fenestra.version")?,
@@ -261,10 +252,9 @@ impl Metadata {
             fit_hashes: texts("fenestra.fit_hashes."),
             sampler: text("fenestra.sampler")?,
             sampler_parameters: texts("fenestra.sampler_parameters."),
-            candidates: match image.attributes.contains_key("fenestra.candidates") {
-                true => Some(number("fenestra.candidates")?),
-                false => None,
-            },
+            candidates: has("fenestra.candidates")
+                .then(|| number("fenestra.candidates"))
+                .transpose()?,
             shadow_rays: number("fenestra.shadow_rays")?,
             depth: number("fenestra.depth")?,
             sample_ranges,

@@ -128,48 +128,38 @@ impl Checkpoint {
     /// # Errors
     /// As [`Checkpoint::read`].
     pub fn from_image(image: &Image, path: &Path) -> Result<Self> {
+        let refuse = |message: String| Error::format(path, message);
         match image.attributes.get(FORMAT_ATTRIBUTE) {
             Some(Attribute::Integer(FORMAT_VERSION)) => {}
             Some(other) => {
-                return Err(Error::format(
-                    path,
-                    format!(
-                        "checkpoint of another version: expected {FORMAT_VERSION}, found {other:?}"
-                    ),
-                ));
+                return Err(refuse(format!(
+                    "checkpoint of another version: expected {FORMAT_VERSION}, found {other:?}"
+                )));
             }
             None => {
-                return Err(Error::format(
-                    path,
-                    format!("not a checkpoint: no attribute {FORMAT_ATTRIBUTE}"),
-                ));
+                return Err(refuse(format!("not a checkpoint: no attribute {FORMAT_ATTRIBUTE}")));
             }
         }
         let metadata = Metadata::load(image, path)?;
         let ahead = metadata.ahead;
         let blocks = [image.width, image.height].map(|side| u64::from(side.div_ceil(FILM_BLOCK)));
         if u64::from(ahead.blocks) >= blocks[0] * blocks[1] {
-            let message = format!("{} blocks of its film have further samples", ahead.blocks);
-            return Err(Error::format(path, message));
+            let blocks = ahead.blocks;
+            return Err(refuse(format!("{blocks} blocks of its film have further samples")));
         }
+        let samples = metadata.sample_count();
         let has_samples = |count: &u32| (*count > 0 || !ahead.is_none()) && *count < u32::MAX;
+        let sample_count = u32::try_from(samples).ok().filter(has_samples);
         let sample_count =
-            u32::try_from(metadata.sample_count()).ok().filter(has_samples).ok_or_else(|| {
-                Error::format(path, format!("{} samples per pixel", metadata.sample_count()))
-            })?;
-        let mut origin = [0; 2];
-        for (value, stored) in origin.iter_mut().zip(image.origin) {
-            *value = u32::try_from(stored).map_err(|_| {
-                Error::format(
-                    path,
-                    format!("window starts at {:?}, outside the film", image.origin),
-                )
-            })?;
-        }
+            sample_count.ok_or_else(|| refuse(format!("{samples} samples per pixel")))?;
+        let [Ok(x), Ok(y)] = image.origin.map(u32::try_from) else {
+            let origin = image.origin;
+            return Err(refuse(format!("window starts at {origin:?}, outside the film")));
+        };
         let mut sums = Sums {
             width: image.width,
             height: image.height,
-            origin,
+            origin: [x, y],
             film_size: image.film_size,
             sample_count,
             ahead,
@@ -178,10 +168,7 @@ impl Checkpoint {
         let layer = |names: [&str; 3], is_optional: bool| match image.triple(names) {
             Some(found) => Ok(found),
             None if is_optional => Ok(Vec::new()),
-            None => {
-                let message = format!("incomplete checkpoint: no channels {names:?}");
-                Err(Error::format(path, message))
-            }
+            None => Err(refuse(format!("incomplete checkpoint: no channels {names:?}"))),
         };
         for (known, values) in TRIPLES.iter().zip(sums.triples_mut()) {
             *values = layer(known.channels, known.aov.is_some())?;
@@ -215,11 +202,9 @@ impl Checkpoint {
             let pending = if ahead.is_none() { Vec::new() } else { pending? };
             sums.groups.push(GroupSums { sum: sum?, compensation: compensation?, pending, name });
         }
-        if sums.non_finite_count() > 0 {
-            return Err(Error::format(
-                path,
-                format!("{} pixels with sums that are not finite", sums.non_finite_count()),
-            ));
+        let bad = sums.non_finite_count();
+        if bad > 0 {
+            return Err(refuse(format!("{bad} pixels with sums that are not finite")));
         }
         let stored = image.attributes.get(CHECKSUM_ATTRIBUTE);
         if stored != Some(&Attribute::Text(checksum(image))) {
@@ -241,16 +226,8 @@ impl Checkpoint {
     /// [`Error::Format`] lists every difference and the remedy.
     pub fn check_resume(&self, path: &Path, expected: &Metadata, window: &Sums) -> Result<()> {
         let mut differences = self.metadata.differences(expected);
-        let described = |sums: &Sums| {
-            format!(
-                "{}x{} at {},{} of {}x{}",
-                sums.width,
-                sums.height,
-                sums.origin[0],
-                sums.origin[1],
-                sums.film_size[0],
-                sums.film_size[1]
-            )
+        let described = |Sums { width, height, origin: [x, y], film_size, .. }: &Sums| {
+            format!("{width}x{height} at {x},{y} of {}x{}", film_size[0], film_size[1])
         };
         let (ours, theirs) = (described(&self.sums), described(window));
         if ours != theirs {
