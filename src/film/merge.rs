@@ -29,25 +29,20 @@ pub struct Part<'a> {
 /// [`Error::Format`] names two files that differ in scene, sampler, window, …, or that share
 /// samples. [`Error::Usage`] without parts.
 pub fn merge_checkpoints(parts: &[(&Path, &Checkpoint)]) -> Result<Checkpoint> {
-    let Some(((_, first), others)) = parts.split_first() else {
-        return Err(Error::usage("nothing to merge"));
-    };
+    let ((_, first), others) = split(parts)?;
     check(parts, |(path, Checkpoint { sums, metadata })| {
         let window = (sums.origin.map(i64::from), sums.width, sums.height, sums.film_size);
         (path, window, metadata)
     })?;
     let mut merged = (*first).clone();
     for (path, part) in others {
-        if merged.sums.sample_count.checked_add(part.sums.sample_count).is_none() {
-            return Err(Error::format(
-                path,
-                format!(
-                    "its {} samples per pixel and the {} of the parts before exceed {}",
-                    part.sums.sample_count,
-                    merged.sums.sample_count,
-                    u32::MAX
-                ),
-            ));
+        let [own, before] = [part, &merged].map(|checkpoint| checkpoint.sums.sample_count);
+        if before.checked_add(own).is_none() {
+            let most = u32::MAX;
+            let message = format!(
+                "its {own} samples per pixel and the {before} of the parts before exceed {most}"
+            );
+            return Err(Error::format(path, message));
         }
         merged.sums.add(&part.sums);
         add_metadata(&mut merged.metadata, &part.metadata);
@@ -61,9 +56,7 @@ pub fn merge_checkpoints(parts: &[(&Path, &Checkpoint)]) -> Result<Checkpoint> {
 /// # Errors
 /// As [`merge_checkpoints`].
 pub fn merge_images(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
-    let Some((first, others)) = parts.split_first() else {
-        return Err(Error::usage("nothing to merge"));
-    };
+    let (first, others) = split(parts)?;
     check(parts, |Part { path, image, metadata }| {
         let window = (image.origin.map(i64::from), image.width, image.height, image.film_size);
         (path, window, metadata)
@@ -95,9 +88,7 @@ pub fn merge_images(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
 /// [`Error::Format`] names two files that differ in film, scene, sampler or samples, or a pixel that no part
 /// shows. [`Error::Usage`] without parts.
 pub fn join_windows(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
-    let Some((first, others)) = parts.split_first() else {
-        return Err(Error::usage("nothing to merge"));
-    };
+    let (first, others) = split(parts)?;
     let mut metadata = first.metadata.clone();
     for part in others {
         let mut differences = part.metadata.differences(first.metadata);
@@ -113,14 +104,9 @@ pub fn join_windows(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
             differences.push(format!("samples: {ours} against {theirs}"));
         }
         if !differences.is_empty() {
-            return Err(Error::format(
-                part.path,
-                format!(
-                    "no window of one film with {}: {}",
-                    first.path.display(),
-                    differences.join("; ")
-                ),
-            ));
+            let (other, list) = (first.path.display(), differences.join("; "));
+            let message = format!("no window of one film with {other}: {list}");
+            return Err(Error::format(part.path, message));
         }
         add_metadata(&mut metadata, part.metadata);
     }
@@ -144,17 +130,14 @@ pub fn join_windows(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
             sources[row * width + column] = Some((index, pixel));
         }
     }
-    let sources: Vec<(usize, usize)> = sources
-        .iter()
-        .enumerate()
-        .map(|(at, source)| {
-            source.ok_or_else(|| {
-                let [x, y] = [at % width, at / width].map(|at| at as i64);
-                let [x, y] = [x + i64::from(origin[0]), y + i64::from(origin[1])];
-                Error::format(first.path, format!("pixel {x},{y} of its film lies in no part"))
-            })
+    let shown = |(at, source): (usize, &Option<(usize, usize)>)| {
+        source.ok_or_else(|| {
+            let [x, y] = [at % width, at / width].map(|at| at as i64);
+            let [x, y] = [x + i64::from(origin[0]), y + i64::from(origin[1])];
+            Error::format(first.path, format!("pixel {x},{y} of its film lies in no part"))
         })
-        .collect::<Result<_>>()?;
+    };
+    let sources = sources.iter().enumerate().map(shown).collect::<Result<Vec<_>>>()?;
     let mut joined = Image {
         width: width as u32,
         height: height as u32,
@@ -169,6 +152,11 @@ pub fn join_windows(parts: &[Part<'_>]) -> Result<(Image, Metadata)> {
     }
     metadata.store(&mut joined);
     Ok((joined, metadata))
+}
+
+/// Parts the first from the others.
+fn split<T>(parts: &[T]) -> Result<(&T, &[T])> {
+    parts.split_first().ok_or_else(|| Error::usage("nothing to merge"))
 }
 
 /// Names of the channels that every part has.
@@ -270,11 +258,8 @@ fn check<T>(parts: &[T], facts: impl Fn(&T) -> (&Path, Placement, &Metadata)) ->
         }
         let differences = metadata.differences(first);
         if !differences.is_empty() {
-            return refuse(format!(
-                "not of one render with {}: {}",
-                first_path.display(),
-                differences.join("; ")
-            ));
+            let (other, list) = (first_path.display(), differences.join("; "));
+            return refuse(format!("not of one render with {other}: {list}"));
         }
         for (earlier_path, _, earlier) in &facts[..index] {
             let ranges = metadata.sample_ranges.iter();
