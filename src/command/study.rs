@@ -12,13 +12,14 @@ use super::{
         parse_duration, parse_size,
     },
     progress::Progress,
+    render::Display,
     self_test,
 };
 use crate::{
     error::{Error, Result},
     sampler::Parameters,
     scene::Scene,
-    session::{Event, Flag, Observer, Standing},
+    session::{Observer, Standing},
     study::{
         contender::Contender,
         engine,
@@ -156,7 +157,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let interrupt = Interrupt::listen();
     interrupt.wait_for_caller();
     let progress = Progress::new("study", arguments.quiet);
-    run_with(arguments, Display { progress, interrupt: &interrupt }, |display, end| {
+    run_with(arguments, Display::new(progress, &interrupt), |display, end| {
         let reason = match end {
             None => "finished",
             Some(Error::Interrupted) => "interrupted; the same command continues it",
@@ -218,9 +219,7 @@ pub fn run_with<O: Observer>(
 /// Layers the options over the quick settings over the study file.
 fn plan(arguments: &Arguments) -> Result<Plan> {
     let mut defaults = Parameters::default();
-    for assignment in &arguments.set {
-        defaults.set(assignment)?;
-    }
+    arguments.set.iter().try_for_each(|assignment| defaults.set(assignment))?;
     let parsers = ValueParsers { duration: parse_duration, size: parse_size };
     let mut scenes = Vec::new();
     let mut study: Option<StudyFile> = None;
@@ -254,6 +253,10 @@ fn plan(arguments: &Arguments) -> Result<Plan> {
         };
         text.as_ref().map(parse).transpose()
     };
+    let check = |text: &String| {
+        CheckPlan::parse(text, Path::new(""), defaults)
+            .map_err(|error| Error::usage(format!("--reference-check {text}: {error}")))
+    };
     let samplers = arguments.samplers.as_ref().map(|texts| {
         Contender::parse_all(texts.iter().map(String::as_str), defaults)
             .map_err(|error| Error::usage(format!("--samplers: {error}")))
@@ -268,14 +271,7 @@ fn plan(arguments: &Arguments) -> Result<Plan> {
         depth: arguments.depth,
         reference_sampler: named("--reference-sampler", &arguments.reference_sampler)?,
         reference_spp: arguments.reference_spp,
-        reference_check: arguments
-            .reference_check
-            .as_ref()
-            .map(|text| {
-                CheckPlan::parse(text, Path::new(""), defaults)
-                    .map_err(|error| Error::usage(format!("--reference-check {text}: {error}")))
-            })
-            .transpose()?,
+        reference_check: arguments.reference_check.as_ref().map(check).transpose()?,
         overhead: arguments.overhead.then_some(true),
         overhead_baseline: named("--baseline", &arguments.baseline)?,
         overhead_spp: None,
@@ -297,25 +293,5 @@ fn quick_options(arguments: &Arguments) -> Options {
         overhead_spp: Some(4),
         overhead_repetitions: Some(6),
         ..Options::default()
-    }
-}
-
-/// Progress and interrupt flag, as seen by the engine.
-struct Display<'a> {
-    progress: Progress,
-    interrupt: &'a Interrupt,
-}
-
-impl Observer for Display<'_> {
-    fn interrupt(&self) -> Flag {
-        self.interrupt.flag()
-    }
-
-    fn notice(&mut self, event: &Event<'_>) {
-        match event {
-            Event::Pass { standing, .. } => self.progress.update(standing),
-            Event::Note(line) => self.progress.print(line),
-            Event::Look(_) => {}
-        }
     }
 }

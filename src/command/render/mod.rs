@@ -263,7 +263,7 @@ impl RenderJob<'_> {
         let writes = self.arguments.writes_checkpoints(&self.output);
         let checkpoints = writes.then(|| (checkpoint_path(&self.output), interval));
         let rules = Rules { checkpoints, ..self.arguments.rules(self.scene.asked) };
-        let mut progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
+        let progress = Progress::new(self.scene.name.clone(), self.arguments.quiet);
         let display = self.open_display()?;
         let is_asked = self.arguments.asked_samples(self.scene.asked).is_some();
         let quality = self.arguments.quality().filter(|_| !is_asked);
@@ -275,9 +275,9 @@ impl RenderJob<'_> {
             Preview::new(path, self.arguments.exposure, interval)
         });
         let mut observer =
-            Display { progress: &mut progress, display, preview, aovs: &self.aovs, interrupt };
+            Display { display, preview, aovs: &self.aovs, ..Display::new(progress, interrupt) };
         let reason = session.run(&rules, &mut observer)?;
-        progress.finish(&session.standing(&rules), &explain(reason, quality));
+        observer.progress.finish(&session.standing(&rules), &explain(reason, quality));
         Ok(reason)
     }
 
@@ -308,13 +308,20 @@ impl RenderJob<'_> {
     }
 }
 
-/// Progress, viewer and interrupts, as seen by the session.
-struct Display<'a> {
-    progress: &'a mut Progress,
+/// Progress, viewer and interrupts, as seen by a session or a study.
+pub(super) struct Display<'a> {
+    pub(super) progress: Progress,
     display: Option<DisplayServer>,
     preview: Option<Preview>,
     aovs: &'a [Aov],
     interrupt: &'a Interrupt,
+}
+
+impl<'a> Display<'a> {
+    /// Shows progress alone.
+    pub(super) fn new(progress: Progress, interrupt: &'a Interrupt) -> Self {
+        Self { progress, display: None, preview: None, aovs: &[], interrupt }
+    }
 }
 
 impl Observer for Display<'_> {
