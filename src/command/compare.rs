@@ -73,18 +73,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         check_replaces_nothing(&[("--heatmap", heatmap)], &inputs)?;
     }
     let image = Image::read_exr(&arguments.image)?;
-    let reference = Image::read_exr(&arguments.reference)?;
-    check_same_picture(&image, &arguments.image, &reference, &arguments.reference)?;
-    let picture = image.rgb(&arguments.image)?;
-    let first = reference.rgb(&arguments.reference)?;
-    let second = match &arguments.second_reference {
-        Some(path) => {
-            let second = Image::read_exr(path)?;
-            check_same_picture(&image, &arguments.image, &second, path)?;
-            Some(second.rgb(path)?)
-        }
-        None => None,
+    let read = |path: &PathBuf| {
+        let reference = Image::read_exr(path)?;
+        check_same_picture(&image, &arguments.image, &reference, path)?;
+        reference.rgb(path)
     };
+    let first = read(&arguments.reference)?;
+    let picture = image.rgb(&arguments.image)?;
+    let second = arguments.second_reference.as_ref().map(read).transpose()?;
     let second = second.as_ref().unwrap_or(&first);
     let metrics = Metrics::of_halves(&picture, &first, second)?;
     print(arguments, &picture, &metrics)?;
@@ -149,19 +145,18 @@ fn print(arguments: &Arguments, picture: &crate::film::RgbImage, metrics: &Metri
 }
 
 fn check_thresholds(arguments: &Arguments, metrics: &Metrics) -> Result<()> {
-    let value = |name: &str| metrics.get(name).unwrap_or(f64::NAN);
-    let above = arguments.fail_above.iter().filter_map(|(name, threshold)| {
-        let value = value(name);
-        // NaN fails every threshold.
-        let within = value <= *threshold;
-        (!within).then(|| format!("{name} is {value:.6e}, above the threshold {threshold}"))
-    });
-    let below = arguments.fail_below.iter().filter_map(|(name, threshold)| {
-        let value = value(name);
-        let within = value >= *threshold;
-        (!within).then(|| format!("{name} is {value:.6e}, below the threshold {threshold}"))
-    });
-    let failures: Vec<String> = above.chain(below).collect();
+    let mut failures = Vec::new();
+    // NaN fails every threshold.
+    let is_within: [fn(&f64, &f64) -> bool; 2] = [f64::le, f64::ge];
+    let limits = [("above", &arguments.fail_above), ("below", &arguments.fail_below)];
+    for ((side, thresholds), is_within) in limits.into_iter().zip(is_within) {
+        for (name, threshold) in thresholds {
+            let value = metrics.get(name).unwrap_or(f64::NAN);
+            if !is_within(&value, threshold) {
+                failures.push(format!("{name} is {value:.6e}, {side} the threshold {threshold}"));
+            }
+        }
+    }
     if failures.is_empty() {
         return Ok(());
     }
