@@ -74,9 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return Err(Error::usage("--exposure: expected a finite number of stops"));
     }
     let mut parameters = Parameters::default();
-    for assignment in &arguments.set {
-        parameters.set(assignment)?;
-    }
+    arguments.set.iter().try_for_each(|assignment| parameters.set(assignment))?;
     let mut settings = Settings {
         sampler: arguments.sampler,
         parameters,

@@ -42,9 +42,7 @@ impl Contender {
                 },
             )?;
         let mut parameters = defaults;
-        for assignment in parts {
-            parameters.set(assignment)?;
-        }
+        parts.try_for_each(|assignment| parameters.set(assignment))?;
         sampler.check(&parameters, 1, &[])?;
         Ok(Self { label: label.to_owned(), sampler, parameters })
     }

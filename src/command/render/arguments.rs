@@ -409,9 +409,7 @@ impl Arguments {
             // paths do not keep groups of lights apart.
             parameters.set("share-paths=off")?;
         }
-        for assignment in &self.set {
-            parameters.set(assignment)?;
-        }
+        self.set.iter().try_for_each(|assignment| parameters.set(assignment))?;
         let mut aovs = self.aov.clone();
         if denoises {
             let wanted = [Aov::Unfiltered, Aov::Albedo, Aov::Normal];

@@ -5,10 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::{
-    error::Result,
-    film::{Sums, png::write_preview},
-};
+use crate::film::{Sums, png::write_preview};
 
 /// Most of the time that previews may take: one in so many parts.
 const SHARE: u32 = 20;
@@ -35,16 +32,13 @@ impl Preview {
         if start < self.next {
             return;
         }
-        if let Err(error) = self.write(sums) {
+        let picture = sums.to_image(&[]).rgb(&self.path);
+        let written = picture.and_then(|rgb| write_preview(&self.path, &rgb, self.exposure));
+        if let Err(error) = written {
             log::warn!("{error}; the next preview tries again");
         }
         // A large picture takes long to compress.
         self.next = Instant::now() + self.interval.max(SHARE * start.elapsed());
-    }
-
-    fn write(&self, sums: &Sums) -> Result<()> {
-        let picture = sums.to_image(&[]).rgb(&self.path)?;
-        write_preview(&self.path, &picture, self.exposure)
     }
 }
 
