@@ -5,7 +5,6 @@ use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use super::{
     contender::Contender,
-    finished::FinishedRuns,
     folder::Folder,
     job::{RunJob, exposure, image_of},
     overhead::OverheadJob,
@@ -54,12 +53,11 @@ pub(crate) fn run(
     observer: &mut dyn Observer,
     redo: bool,
 ) -> Result<(Results, Option<Error>)> {
-    let finished = FinishedRuns { plan, folder, device };
-    let mut study = Study { plan, folder, device, finished, watch: Watch::new(observer) };
+    let mut study = Study { plan, folder, device, watch: Watch::new(observer) };
     let scenes = study.load_scenes()?;
     let inputs = scenes.iter().flat_map(|scene| &scene.inputs).map(PathBuf::as_path);
     folder.check_replaces_nothing(&inputs.collect::<Vec<_>>())?;
-    study.finished.check(&scenes, redo)?;
+    study.check_finished(&scenes, redo)?;
     let mut results = Results::default();
     for scene in &scenes {
         study.expect(scene);
@@ -72,11 +70,11 @@ pub(crate) fn run(
     Ok((results, None))
 }
 
-struct Study<'a> {
-    plan: &'a Plan,
-    folder: &'a Folder,
-    device: &'a Arc<Device>,
-    finished: FinishedRuns<'a>,
+/// A study at work.
+pub(super) struct Study<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) folder: &'a Folder,
+    pub(super) device: &'a Arc<Device>,
     watch: Watch<'a>,
 }
 
@@ -151,9 +149,9 @@ impl Study<'_> {
         }
         if let Some(overhead) = &self.plan.overhead {
             let finished: Vec<Option<Round>> = (1..=overhead.repetitions)
-                .map(|repetition| self.finished.round(scene, repetition))
+                .map(|repetition| self.finished_round(scene, repetition))
                 .collect::<Result<_>>()?;
-            let conditions = self.finished.conditions(scene, None)?;
+            let conditions = self.conditions(scene, None)?;
             let job = OverheadJob { plan: overhead, scene, conditions, folder: self.folder };
             let all = std::iter::once(&overhead.baseline).chain(&overhead.contenders);
             let settings: Vec<Settings> = all.map(|contender| self.settings(contender)).collect();
@@ -239,7 +237,7 @@ impl Study<'_> {
         let mut sessions: BTreeMap<String, Session> = BTreeMap::new();
         for task in self.plan.tasks() {
             let (rule, seed, contender) = task;
-            if let Some(run) = self.finished.run(scene, task)? {
+            if let Some(run) = self.finished_run(scene, task)? {
                 expect_run(&mut self.watch, rule, pixels(scene), -1.0);
                 results.runs.push(run);
                 continue;
@@ -259,11 +257,11 @@ impl Study<'_> {
                 rule,
                 seed,
                 levels: &self.plan.spp,
-                conditions: self.finished.conditions(scene, Some(contender))?,
+                conditions: self.conditions(scene, Some(contender))?,
                 folder: self.folder,
             };
             let run = job.execute(session, &mut self.watch)?;
-            write_json(&self.finished.run_path(scene, task), &run)?;
+            write_json(&self.run_path(scene, task), &run)?;
             if let Some(last) = run.last() {
                 self.watch.note(&format!(
                     "{}: {}, {}, seed {seed}: {} spp in {:.2} s, RMSE {:.4e}",

@@ -1,30 +1,20 @@
 //! Finds the finished runs that a plan can reuse and those made under other conditions.
 
-use std::{collections::BTreeMap, fs, path::PathBuf, sync::Arc};
+use std::{collections::BTreeMap, fs, path::PathBuf};
 
 use super::{
     contender::Contender,
-    folder::Folder,
-    overhead,
-    plan::Plan,
-    reference,
+    engine::Study,
+    overhead, reference,
     rule::Rule,
     runs::{Conditions, Round, Run, run_stem},
 };
 use crate::{
     error::{Error, Result},
-    gpu::Device,
     scene::Scene,
 };
 
-/// Runs of `plan` that `folder` already holds.
-pub(super) struct FinishedRuns<'a> {
-    pub(super) plan: &'a Plan,
-    pub(super) folder: &'a Folder,
-    pub(super) device: &'a Arc<Device>,
-}
-
-impl FinishedRuns<'_> {
+impl Study<'_> {
     /// Returns the conditions of a contender's runs, or with `None` those of overhead rounds, which
     /// have no reference and several contenders.
     pub(super) fn conditions(
@@ -65,7 +55,11 @@ impl FinishedRuns<'_> {
     }
 
     /// Reads a run that is finished and holds everything the plan asks for.
-    pub(super) fn run(&self, scene: &Scene, task: (Rule, u32, &Contender)) -> Result<Option<Run>> {
+    pub(super) fn finished_run(
+        &self,
+        scene: &Scene,
+        task: (Rule, u32, &Contender),
+    ) -> Result<Option<Run>> {
         let path = self.run_path(scene, task);
         Ok(self.folder.read_json::<Run>(&path)?.filter(|run| {
             let has_image =
@@ -75,13 +69,13 @@ impl FinishedRuns<'_> {
     }
 
     /// Reads a finished overhead round with the plan's number of samples.
-    pub(super) fn round(&self, scene: &Scene, repetition: u32) -> Result<Option<Round>> {
+    pub(super) fn finished_round(&self, scene: &Scene, repetition: u32) -> Result<Option<Round>> {
         let round = self.folder.read_json::<Round>(&self.folder.round(&scene.name, repetition))?;
         Ok(round.filter(|round| Some(round.spp) == self.plan.overhead.as_ref().map(|o| o.spp)))
     }
 
     /// Refuses finished runs that were made under other conditions, or removes them with `redo`.
-    pub(super) fn check(&self, scenes: &[Scene], redo: bool) -> Result<()> {
+    pub(super) fn check_finished(&self, scenes: &[Scene], redo: bool) -> Result<()> {
         let mut stale: Vec<(PathBuf, String)> = Vec::new();
         let mut compare = |path: PathBuf, found: &Conditions, asked: &Conditions| {
             let difference = found.differences(asked).into_iter().next();
@@ -89,14 +83,14 @@ impl FinishedRuns<'_> {
         };
         for scene in scenes {
             for task in self.plan.tasks() {
-                if let Some(run) = self.run(scene, task)? {
+                if let Some(run) = self.finished_run(scene, task)? {
                     let asked = self.conditions(scene, Some(task.2))?;
                     compare(self.run_path(scene, task), &run.conditions, &asked);
                 }
             }
             let rounds = self.plan.overhead.as_ref().map_or(0, |overhead| overhead.repetitions);
             for repetition in 1..=rounds {
-                if let Some(round) = self.round(scene, repetition)? {
+                if let Some(round) = self.finished_round(scene, repetition)? {
                     let asked = self.conditions(scene, None)?;
                     compare(self.folder.round(&scene.name, repetition), &round.conditions, &asked);
                 }
