@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 use super::{
     contender::Contender,
     folder::Folder,
-    job::{RunJob, exposure, image_of},
+    job::{RunJob, exposure},
     overhead::OverheadJob,
     plan::{CheckPlan, Plan, ReferencePlan},
     reference::{HALF_STEMS, Reference},
@@ -19,7 +19,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     files::write_json,
-    film::{Aov, png::write_preview},
+    film::{Aov, Image, png::write_preview},
     gpu::Device,
     pass::SceneBuffers,
     sampler::Sampler,
@@ -185,7 +185,8 @@ impl Study<'_> {
                 let reference = Reference::read(plan, scene)?;
                 // Copy the halves into the folder, so that it holds everything the page needs.
                 for (stem, half) in HALF_STEMS.iter().zip([&reference.first, &reference.second]) {
-                    image_of(half).write_exr(&self.folder.image(&scene.name, stem))?;
+                    let image = Image::of_rgb(half.width, half.height, &half.pixels);
+                    image.write_exr(&self.folder.image(&scene.name, stem))?;
                 }
                 reference
             }

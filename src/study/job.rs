@@ -108,7 +108,7 @@ impl RunJob<'_> {
 
     /// Writes the picture; returns its path inside the report folder.
     fn keep(&self, picture: &RgbImage, session: &Session, level: Rule) -> Result<String> {
-        let mut image = image_of(picture);
+        let mut image = Image::of_rgb(picture.width, picture.height, &picture.pixels);
         session.metadata().store(&mut image);
         let stem = run_stem(self.contender, level, self.seed);
         let path = self.folder.image(&self.scene.name, &stem);
@@ -118,13 +118,6 @@ impl RunJob<'_> {
         }
         Ok(Folder::image_name(&self.scene.name, &stem))
     }
-}
-
-/// Converts a picture to an image of three channels.
-pub(super) fn image_of(picture: &RgbImage) -> Image {
-    let mut image = Image::new(picture.width, picture.height);
-    image.insert_triple(["R", "G", "B"], &picture.pixels);
-    image
 }
 
 /// Exposure in stops at which 85% of the pixels stay below white, by their brightest channel.
