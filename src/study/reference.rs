@@ -12,8 +12,13 @@ use std::{
 use sha2::{Digest, Sha256};
 
 use super::{
-    contender::Contender, folder::Folder, metrics::Metrics, own_errors::OwnErrors,
-    plan::ReferencePlan, statistics::mean_standard_error, watch::Watch,
+    contender::Contender,
+    folder::Folder,
+    metrics::{Metrics, not_finite},
+    own_errors::OwnErrors,
+    plan::ReferencePlan,
+    statistics::mean_standard_error,
+    watch::Watch,
 };
 use crate::{
     error::{Error, Result},
@@ -299,17 +304,13 @@ fn check(image: &Image, path: &Path, scene: &Scene) -> Result<()> {
     let refuse = |message: String| Err(Error::comparison(message));
     let (width, height) = (scene.film.width, scene.film.height);
     if (image.width, image.height) != (width, height) || image.origin != [0, 0] {
+        let size = format!("{}x{}", image.width, image.height);
+        let [x, y] = image.origin;
         return refuse(format!(
-            "the reference {} shows {}x{} pixels at {},{}; the film of {} has {width}x{height}: give \
-             --size {}x{} or another reference",
+            "the reference {} shows {size} pixels at {x},{y}; the film of {} has {width}x{height}: give \
+             --size {size} or another reference",
             path.display(),
-            image.width,
-            image.height,
-            image.origin[0],
-            image.origin[1],
-            scene.name,
-            image.width,
-            image.height
+            scene.name
         ));
     }
     match image.attributes.get("fenestra.scene_hash") {
@@ -328,17 +329,11 @@ fn check(image: &Image, path: &Path, scene: &Scene) -> Result<()> {
             scene.name
         ),
     }
-    let picture = image.rgb(path)?;
-    let is_bad = |pixel: &[f32; 3]| pixel.iter().any(|value| !value.is_finite());
-    if let Some(index) = picture.pixels.iter().position(is_bad) {
-        let count = picture.pixels.iter().filter(|pixel| is_bad(pixel)).count();
-        return refuse(format!(
-            "the reference {} has {count} pixels that are not finite, the first at {},{}: {:?}",
-            path.display(),
-            index % width as usize,
-            index / width as usize,
-            picture.pixels[index]
-        ));
+    match not_finite(&image.rgb(path)?) {
+        None => Ok(()),
+        Some((count, first)) => refuse(format!(
+            "the reference {} has {count} pixels that are not finite, {first}",
+            path.display()
+        )),
     }
-    Ok(())
 }

@@ -245,19 +245,20 @@ fn check(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -> Result<()> 
         }
     }
     for (name, image) in [("picture", picture), ("reference", first), ("reference", second)] {
-        let is_bad = |pixel: &[f32; 3]| pixel.iter().any(|value| !value.is_finite());
-        if let Some(index) = image.pixels.iter().position(is_bad) {
-            let count = image.pixels.iter().filter(|pixel| is_bad(pixel)).count();
-            let width = image.width as usize;
-            return comparison(format!(
-                "{count} pixels of the {name} are not finite, the first at {},{}: {:?}",
-                index % width,
-                index / width,
-                image.pixels[index]
-            ));
+        if let Some((count, first)) = not_finite(image) {
+            return comparison(format!("{count} pixels of the {name} are not finite, {first}"));
         }
     }
     Ok(())
+}
+
+/// Counts the pixels that are not finite, if there are any, and says where the first lies.
+pub(super) fn not_finite(picture: &RgbImage) -> Option<(usize, String)> {
+    let is_bad = |(_, pixel): &(usize, &[f32; 3])| pixel.iter().any(|value| !value.is_finite());
+    let bad = || picture.pixels.iter().enumerate().filter(is_bad);
+    let (index, pixel) = bad().next()?;
+    let [x, y] = [index % picture.width as usize, index / picture.width as usize];
+    Some((bad().count(), format!("the first at {x},{y}: {pixel:?}")))
 }
 
 #[cfg(test)]
