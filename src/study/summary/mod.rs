@@ -132,6 +132,11 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     sum / f64::max(count, 1.0)
 }
 
+/// Mean of values that all are there.
+fn mean_of_all(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    values.collect::<Option<Vec<f64>>>().map(|values| mean(values.into_iter()))
+}
+
 /// Mean of figures over the runs, by name; a figure that a run lacks counts as 0.
 fn means(
     own: &[(&Run, &Measurement)],
@@ -219,18 +224,10 @@ fn summary(
         parts,
         surfaces_ratio: by_seed(&|ours, theirs| trimmed(ours) / trimmed(theirs))
             .filter(|_| surfaces_judged),
-        flip: own
-            .iter()
-            .map(|(_, m)| m.flip)
-            .collect::<Option<Vec<f64>>>()
-            .map(|values| mean(values.into_iter())),
+        flip: mean_of_all(own.iter().map(|(_, m)| m.flip)),
         mean_ratio: mean_interval(&ratios).unwrap_or(Interval { middle: 1.0, low: 1.0, high: 1.0 }),
         mean_deviation: own.iter().filter_map(|(_, m)| m.mean_deviation).reduce(largest),
-        visible_share: {
-            let shares: Option<Vec<f64>> =
-                own.iter().map(|(run, _)| run.figures.visible_share).collect();
-            shares.map(|shares| mean(shares.into_iter()))
-        },
+        visible_share: mean_of_all(own.iter().map(|(run, _)| run.figures.visible_share)),
         gpu_ms_per_sample: means(own, |run| &run.figures.gpu_ms_per_sample),
         statistics: means(own, |run| &run.figures.statistics),
     }
@@ -274,15 +271,11 @@ pub fn curves(plan: &Plan, scenes: &[StudiedScene], runs: &[Run]) -> Vec<Curve> 
     let mut all = Vec::new();
     for scene in scenes {
         for contender in &plan.contenders {
-            let own: Vec<&Run> = runs
-                .iter()
-                .filter(|run| run.scene == scene.name && run.sampler == contender.label)
-                .collect();
-            let by_samples = own.iter().any(|run| matches!(run.rule, Rule::Spp(_)));
-            let own: Vec<&Run> = own
-                .into_iter()
-                .filter(|run| matches!(run.rule, Rule::Spp(_)) == by_samples)
-                .collect();
+            let is_own = |run: &&Run| run.scene == scene.name && run.sampler == contender.label;
+            let own = || runs.iter().filter(is_own);
+            let is_by_samples = |run: &Run| matches!(run.rule, Rule::Spp(_));
+            let by_samples = own().any(is_by_samples);
+            let own: Vec<&Run> = own().filter(|run| is_by_samples(run) == by_samples).collect();
             if !own.is_empty() {
                 all.push(curve(scene, &contender.label, &own));
             }
@@ -309,11 +302,8 @@ fn curve(scene: &StudiedScene, sampler: &str, runs: &[&Run]) -> Curve {
     let points: Vec<CurvePoint> = counts
         .into_iter()
         .filter_map(|spp| {
-            let at: Option<Vec<&Measurement>> = runs
-                .iter()
-                .map(|run| run.measurements.iter().find(|measurement| measurement.spp == spp))
-                .collect();
-            let at = at?;
+            let at = runs.iter().map(|run| run.measurements.iter().find(|m| m.spp == spp));
+            let at: Vec<&Measurement> = at.collect::<Option<_>>()?;
             let mse = mean(at.iter().map(|measurement| measurement.mse));
             let single: Vec<f64> = at.iter().map(|m| m.mse.max(0.0).sqrt()).collect();
             let around = geometric_interval(&single).filter(|_| is_judged(mse, own))?;
