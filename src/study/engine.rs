@@ -7,7 +7,6 @@ use super::{
     contender::Contender,
     folder::Folder,
     job::{RunJob, exposure},
-    overhead::OverheadJob,
     plan::{CheckPlan, Plan, ReferencePlan},
     reference::{HALF_STEMS, Reference},
     reference_check::{self, CheckJob, ReferenceCheck, Verdict},
@@ -75,7 +74,7 @@ pub(super) struct Study<'a> {
     pub(super) plan: &'a Plan,
     pub(super) folder: &'a Folder,
     pub(super) device: &'a Arc<Device>,
-    watch: Watch<'a>,
+    pub(super) watch: Watch<'a>,
 }
 
 impl Study<'_> {
@@ -148,21 +147,13 @@ impl Study<'_> {
             self.compare(scene, &mut buffers, (&reference, &surfaces), results)?;
         }
         if let Some(overhead) = &self.plan.overhead {
-            let finished: Vec<Option<Round>> = (1..=overhead.repetitions)
-                .map(|repetition| self.finished_round(scene, repetition))
-                .collect::<Result<_>>()?;
-            let conditions = self.conditions(scene, None)?;
-            let job = OverheadJob { plan: overhead, scene, conditions, folder: self.folder };
-            let all = std::iter::once(&overhead.baseline).chain(&overhead.contenders);
-            let settings: Vec<Settings> = all.map(|contender| self.settings(contender)).collect();
-            let make = &mut |index: usize| buffers.session(settings[index].clone());
-            job.execute(finished, make, &mut self.watch, &mut results.rounds)?;
+            self.measure_overhead(overhead, scene, &mut buffers, &mut results.rounds)?;
         }
         self.device.save_pipeline_cache();
         Ok(())
     }
 
-    fn settings(&self, contender: &Contender) -> Settings {
+    pub(super) fn settings(&self, contender: &Contender) -> Settings {
         Settings {
             sampler: contender.sampler,
             parameters: contender.parameters,
@@ -299,14 +290,14 @@ fn expect_run(watch: &mut Watch<'_>, rule: Rule, pixels: f64, count: f64) {
 }
 
 /// Device buffers of a scene, created when the first session needs them.
-struct SharedBuffers<'a> {
+pub(super) struct SharedBuffers<'a> {
     device: &'a Arc<Device>,
     scene: &'a Scene,
     made: Option<Arc<SceneBuffers>>,
 }
 
 impl SharedBuffers<'_> {
-    fn session(&mut self, settings: Settings) -> Result<Session> {
+    pub(super) fn session(&mut self, settings: Settings) -> Result<Session> {
         let buffers = match &self.made {
             Some(buffers) => Arc::clone(buffers),
             None => {

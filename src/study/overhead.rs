@@ -10,11 +10,10 @@ use serde::Serialize;
 
 use super::{
     contender::Contender,
-    folder::Folder,
+    engine::{SharedBuffers, Study},
     plan::OverheadPlan,
-    runs::{Conditions, Round, Timing, assignments},
+    runs::{Round, Timing, assignments},
     statistics::{Interval, median_interval},
-    watch::Watch,
 };
 use crate::{
     error::Result,
@@ -23,41 +22,36 @@ use crate::{
     session::{Figures, Rules, Session},
 };
 
-/// Overhead measurements of one scene.
-pub(super) struct OverheadJob<'a> {
-    pub(super) plan: &'a OverheadPlan,
-    pub(super) scene: &'a Scene,
-    pub(super) conditions: Conditions,
-    pub(super) folder: &'a Folder,
-}
-
-impl OverheadJob<'_> {
-    /// Measures the rounds that `finished` lacks and appends all to `rounds`; `make` creates the
-    /// renderer of a sampler by its index, 0 being the baseline.
-    pub(super) fn execute(
-        self,
-        finished: Vec<Option<Round>>,
-        make: &mut dyn FnMut(usize) -> Result<Session>,
-        watch: &mut Watch<'_>,
+impl Study<'_> {
+    /// Measures the rounds of a scene that the folder lacks and appends all to `rounds`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Interrupted`]; a failing device or disk.
+    pub(super) fn measure_overhead(
+        &mut self,
+        plan: &OverheadPlan,
+        scene: &Scene,
+        buffers: &mut SharedBuffers<'_>,
         rounds: &mut Vec<Round>,
     ) -> Result<()> {
-        let OverheadPlan { baseline, contenders, spp, .. } = self.plan;
+        let OverheadPlan { baseline, contenders, spp, repetitions } = plan;
         let samplers: Vec<_> = std::iter::once(baseline).chain(contenders).collect();
-        let pixels = f64::from(self.scene.film.width) * f64::from(self.scene.film.height);
+        let conditions = self.conditions(scene, None)?;
+        let pixels = f64::from(scene.film.width) * f64::from(scene.film.height);
         let paths_per_round = pixels * f64::from(*spp) * samplers.len() as f64;
         let mut sessions: Vec<Session> = Vec::new();
         let rules = Rules { samples: Some(*spp), ..Rules::default() };
-        for (repetition, finished) in (1_u32..).zip(finished) {
-            if let Some(round) = finished {
-                watch.expect(-paths_per_round, 0.0);
+        for repetition in 1..=*repetitions {
+            if let Some(round) = self.finished_round(scene, repetition)? {
+                self.watch.expect(-paths_per_round, 0.0);
                 rounds.push(round);
                 continue;
             }
             if sessions.is_empty() {
-                for index in 0..samplers.len() {
-                    let mut session = make(index)?;
+                for sampler in &samplers {
+                    let mut session = buffers.session(self.settings(sampler))?;
                     // Render until the size of the waves has settled.
-                    watch.run(&mut session, &rules, false)?;
+                    self.watch.run(&mut session, &rules, false)?;
                     sessions.push(session);
                 }
             }
@@ -66,7 +60,7 @@ impl OverheadJob<'_> {
                 let turned = (index + repetition as usize - 1) % samplers.len();
                 let session = &mut sessions[turned];
                 session.restart(repetition)?;
-                watch.run(session, &rules, false)?;
+                self.watch.run(session, &rules, false)?;
                 let figures = Figures::of(&session.renderer, session.seconds());
                 timings.push(Timing {
                     sampler: samplers[turned].label.clone(),
@@ -77,19 +71,17 @@ impl OverheadJob<'_> {
                 });
             }
             let round = Round {
-                scene: self.scene.name.clone(),
+                scene: scene.name.clone(),
                 repetition,
                 spp: *spp,
-                conditions: self.conditions.clone(),
+                conditions: conditions.clone(),
                 timings,
             };
-            write_json(&self.folder.round(&self.scene.name, repetition), &round)?;
+            write_json(&self.folder.round(&scene.name, repetition), &round)?;
             rounds.push(round);
         }
-        watch.note(&format!(
-            "{}: overhead over {}, {} rounds",
-            self.scene.name, baseline.label, self.plan.repetitions
-        ));
+        let (scene, baseline) = (&scene.name, &baseline.label);
+        self.watch.note(&format!("{scene}: overhead over {baseline}, {repetitions} rounds"));
         Ok(())
     }
 }
@@ -227,6 +219,7 @@ fn overhead(scene: &str, baseline: &str, sampler: &str, pairs: &[[&Timing; 2]]) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::runs::Conditions;
 
     fn timing(sampler: &str, passes: &[(&str, f64)], visible: f64) -> Timing {
         Timing {
