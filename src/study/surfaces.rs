@@ -73,7 +73,9 @@ impl Surfaces {
         let is_surface = mask(&image.rgb(&path)?);
         let count = is_surface.iter().filter(|inside| **inside).count();
         let halves = [&reference.second, &reference.second];
-        let quarter = |part: Option<PartErrors>| part.map(|part| part.map(|error| 0.25 * error));
+        let quarter = |part: Option<PartErrors>| {
+            part.map(|part| PartErrors::each(|error| 0.25 * error(&part)))
+        };
         let [surfaces, environment] = split(&reference.first, halves, &is_surface)?.map(quarter);
         let surface_share = count as f64 / is_surface.len().max(1) as f64;
         Ok(Self { is_surface, own: OwnParts { surface_share, surfaces, environment } })

@@ -54,12 +54,12 @@ impl PartErrors {
         Ok(Some(Self { mse, relmse: relative.mean, relmse_trimmed: relative.trimmed }))
     }
 
-    #[must_use]
-    pub(crate) fn map(self, function: impl Fn(f64) -> f64) -> Self {
+    /// Computes each figure, given the function that takes it from errors.
+    pub(crate) fn each(figure: impl Fn(fn(&Self) -> f64) -> f64) -> Self {
         Self {
-            mse: function(self.mse),
-            relmse: function(self.relmse),
-            relmse_trimmed: function(self.relmse_trimmed),
+            mse: figure(|part| part.mse),
+            relmse: figure(|part| part.relmse),
+            relmse_trimmed: figure(|part| part.relmse_trimmed),
         }
     }
 }

@@ -287,12 +287,7 @@ pub fn curves(plan: &Plan, scenes: &[StudiedScene], runs: &[Run]) -> Vec<Curve> 
 /// Mean of errors in a part of the picture; `None` if there are none or one lacks the part.
 fn mean_of_parts(parts: impl Iterator<Item = Option<PartErrors>>) -> Option<PartErrors> {
     let parts: Vec<PartErrors> = parts.collect::<Option<Vec<_>>>()?;
-    let of = |value: fn(&PartErrors) -> f64| mean(parts.iter().map(value));
-    (!parts.is_empty()).then(|| PartErrors {
-        mse: of(|part| part.mse),
-        relmse: of(|part| part.relmse),
-        relmse_trimmed: of(|part| part.relmse_trimmed),
-    })
+    (!parts.is_empty()).then(|| PartErrors::each(|error| mean(parts.iter().map(error))))
 }
 
 fn curve(scene: &StudiedScene, sampler: &str, runs: &[&Run]) -> Curve {
