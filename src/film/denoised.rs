@@ -81,22 +81,16 @@ pub(crate) fn image_of(film: &Image, pixels: &[[f32; 3]], denoiser: String) -> I
 /// # Errors
 /// [`Error::Format`] names the denoiser.
 pub(crate) fn check_film(image: &Image, path: &Path) -> Result<()> {
-    match image.attributes.get(DENOISED) {
-        None => Ok(()),
-        Some(denoiser) => {
-            let name = match denoiser {
-                Attribute::Text(name) => name.as_str(),
-                _ => "a denoiser",
-            };
-            Err(Error::format(
-                path,
-                format!(
-                    "made by {name}, and so biased: no film to merge, to refer to or to denoise; take the \
-                     image that it was made of"
-                ),
-            ))
-        }
-    }
+    let name = match image.attributes.get(DENOISED) {
+        None => return Ok(()),
+        Some(Attribute::Text(name)) => name.as_str(),
+        Some(_) => "a denoiser",
+    };
+    let message = format!(
+        "made by {name}, and so biased: no film to merge, to refer to or to denoise; take the image that it \
+         was made of"
+    );
+    Err(Error::format(path, message))
 }
 
 #[cfg(test)]

@@ -102,14 +102,11 @@ impl Study<'_> {
                 fs::remove_file(path).map_err(|source| Error::io(path, "remove", source))
             });
         }
-        Err(Error::format(
-            path,
-            format!(
-                "made under other conditions than those asked for ({first}), one of {} such runs in \
-                 the folder; choose another folder with -o, or give --redo to remove them and make \
-                 them again",
-                stale.len()
-            ),
-        ))
+        let message = format!(
+            "made under other conditions than those asked for ({first}), one of {} such runs in the folder; \
+             choose another folder with -o, or give --redo to remove them and make them again",
+            stale.len()
+        );
+        Err(Error::format(path, message))
     }
 }

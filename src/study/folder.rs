@@ -60,14 +60,12 @@ impl Folder {
             let found: Option<Mark> = folder.read_json(&mark)?;
             let format = found.map(|mark| mark.format).unwrap_or_default();
             if format != FORMAT {
-                return Err(Error::format(
-                    &mark,
-                    format!(
-                        "expected format {FORMAT:?}, found {format:?}: a study of another version, \
-                         whose figures cannot be mixed with these; choose another folder with -o, \
-                         or give its references by --reference FOLDER"
-                    ),
-                ));
+                let message = format!(
+                    "expected format {FORMAT:?}, found {format:?}: a study of another version, whose \
+                     figures cannot be mixed with these; choose another folder with -o, or give its \
+                     references by --reference FOLDER"
+                );
+                return Err(Error::format(&mark, message));
             }
             check_writable(&path.join("results.json"))?;
             return folder.locked();
@@ -76,14 +74,11 @@ impl Folder {
             let mut entries =
                 fs::read_dir(path).map_err(|source| Error::io(path, "read", source))?;
             if let Some(Ok(entry)) = entries.next() {
-                return Err(Error::format(
-                    path,
-                    format!(
-                        "the folder holds something else than a study ({}); choose an empty or new \
-                         one with -o",
-                        entry.file_name().display()
-                    ),
-                ));
+                let message = format!(
+                    "the folder holds something else than a study ({}); choose an empty or new one with -o",
+                    entry.file_name().display()
+                );
+                return Err(Error::format(path, message));
             }
         }
         write_json(&mark, &Mark { format: FORMAT.to_owned() })?;
@@ -95,13 +90,11 @@ impl Folder {
         let file = File::open(&mark).map_err(|source| Error::io(&mark, "open", source))?;
         match file.try_lock() {
             Ok(()) => Ok(Self { _lock: Some(Arc::new(file)), ..self }),
-            Err(TryLockError::WouldBlock) => Err(Error::Usage {
-                message: format!(
-                    "{}: another study is at work in this folder; wait for its end, or choose \
-                     another folder with -o",
-                    self.path.display()
-                ),
-            }),
+            Err(TryLockError::WouldBlock) => Err(Error::usage(format!(
+                "{}: another study is at work in this folder; wait for its end, or choose another folder \
+                 with -o",
+                self.path.display()
+            ))),
             // Some network file systems have no locks.
             Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => {
                 Ok(self)

@@ -252,14 +252,12 @@ impl Checkpoint {
         if differences.is_empty() {
             return Ok(());
         }
-        Err(Error::format(
-            path,
-            format!(
-                "the checkpoint belongs to another render ({}); give the options it was made with, \
-                 or leave out --resume to start again",
-                differences.join("; ")
-            ),
-        ))
+        let message = format!(
+            "the checkpoint belongs to another render ({}); give the options it was made with, or leave out \
+             --resume to start again",
+            differences.join("; ")
+        );
+        Err(Error::format(path, message))
     }
 }
 
