@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    files::{check_replaces_nothing, check_writable, is_special_file},
+    files::{check_replaces_nothing, check_writable, extension, is_special_file},
     film::{Aov, Window, checkpoint::checkpoint_path},
     pass::Roulette,
     sampler::{Parameters, Sampler},
@@ -366,18 +366,16 @@ impl Arguments {
     /// # Errors
     /// [`Error::Usage`] for options that contradict each other or are out of range.
     pub(super) fn settings(&self, denoises: bool) -> Result<Settings> {
-        if let Some(output) = &self.output
-            && output.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("exr"))
-            && !is_special_file(output)
+        let special = self.output.as_ref().filter(|output| is_special_file(output));
+        if let (Some(output), None) = (&self.output, special)
+            && extension(output) != "exr"
         {
             return Err(Error::usage(format!(
                 "--output {}: expected a name that ends in .exr; --png writes a preview beside it",
                 output.display()
             )));
         }
-        if let Some(output) = &self.output
-            && is_special_file(output)
-        {
+        if let Some(output) = special {
             let beside = [
                 ("--png", self.png),
                 ("--png-every", self.png_every.is_some()),

@@ -99,11 +99,8 @@ impl Sequence {
         scene.warnings.iter().for_each(|warning| self.warn(warning));
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
         arguments.resize(&mut scene.film);
-        if let Some(line) = arguments.take_asked(&scene, &mut settings).filter(|_| !arguments.quiet)
-        {
-            say!("{line}");
-        }
-        if let Some(line) = arguments.unshared(&settings).filter(|_| !arguments.quiet) {
+        let notes = [arguments.take_asked(&scene, &mut settings), arguments.unshared(&settings)];
+        for line in notes.into_iter().flatten().filter(|_| !arguments.quiet) {
             say!("{line}");
         }
         // Fail before the work, not after it.
