@@ -58,66 +58,52 @@ pub(crate) const LAYERS: [(u32, &str, Option<Aov>); 7] = [
     (SHOW_LEVELS, "kinds of cells", Some(Aov::GuideCell)),
 ];
 
-/// A key by the text it types, or by its name, and its effect.
-#[derive(Clone, Copy, Debug)]
-pub struct Key {
-    /// Text, or one of the names `Escape` and `Tab`.
-    pub key: &'static str,
-    /// Effect.
-    pub action: Action,
-    /// One phrase for the documentation; empty where the row before says it.
-    pub about: &'static str,
-}
-
-const fn key(key: &'static str, action: Action, about: &'static str) -> Key {
-    Key { key, action, about }
-}
-
-/// Every key but those of samplers.
-const KEYS: &[Key] = &[
-    key("w", Action::Fly(2, 1.0), "fly forward and back"),
-    key("s", Action::Fly(2, -1.0), ""),
-    key("a", Action::Fly(0, -1.0), "fly left and right"),
-    key("d", Action::Fly(0, 1.0), ""),
-    key("q", Action::Fly(1, -1.0), "fly down and up"),
-    key("e", Action::Fly(1, 1.0), ""),
-    key("r", Action::Home, "return to the camera of the scene"),
-    key("x", Action::Split, "two samplers side by side at equal time, or one"),
-    key("z", Action::Swap, "choose the sampler of the other side"),
-    key("[", Action::Depth(-1), "fewer and more path vertices"),
-    key("]", Action::Depth(1), ""),
-    key("-", Action::Exposure(-0.5), "exposure, half a stop down and up"),
-    key("=", Action::Exposure(0.5), ""),
-    key("0", Action::AutoExposure, "exposure by the picture"),
-    key("c", Action::Curve, "next tone curve: clip, reinhard, filmic"),
-    key(
+/// Every key but those of samplers: its text, or one of the names `Escape` and `Tab`; its effect; and one
+/// phrase for the documentation, empty where the row before says it.
+const KEYS: &[(&str, Action, &str)] = &[
+    ("w", Action::Fly(2, 1.0), "fly forward and back"),
+    ("s", Action::Fly(2, -1.0), ""),
+    ("a", Action::Fly(0, -1.0), "fly left and right"),
+    ("d", Action::Fly(0, 1.0), ""),
+    ("q", Action::Fly(1, -1.0), "fly down and up"),
+    ("e", Action::Fly(1, 1.0), ""),
+    ("r", Action::Home, "return to the camera of the scene"),
+    ("x", Action::Split, "two samplers side by side at equal time, or one"),
+    ("z", Action::Swap, "choose the sampler of the other side"),
+    ("[", Action::Depth(-1), "fewer and more path vertices"),
+    ("]", Action::Depth(1), ""),
+    ("-", Action::Exposure(-0.5), "exposure, half a stop down and up"),
+    ("=", Action::Exposure(0.5), ""),
+    ("0", Action::AutoExposure, "exposure by the picture"),
+    ("c", Action::Curve, "next tone curve: clip, reinhard, filmic"),
+    (
         "h",
         Action::Layer(SHOW_ERROR),
         "relative error in false colour, from 1% (blue) to 100% (red)",
     ),
-    key("g", Action::Layer(SHOW_CELLS), "cells of `guided`"),
-    key(
+    ("g", Action::Layer(SHOW_CELLS), "cells of `guided`"),
+    (
         "l",
         Action::NextLayer,
         "next layer: picture, error, albedo, normal, visible share, cells, their kinds",
     ),
-    key(
+    (
         "i",
         Action::Inset,
         "learned sky of the pixel under the cursor: visibility above, density below",
     ),
-    key("p", Action::Save, "write the window (PNG), the film (EXR) and the camera (TOML)"),
-    key("b", Action::Bookmark, "write the camera alone, to return to it"),
-    key("Tab", Action::Panel, "show or hide the panel"),
-    key("?", Action::Help, "show or hide these keys"),
-    key("Escape", Action::Quit, "hide these keys, or close the window"),
+    ("p", Action::Save, "write the window (PNG), the film (EXR) and the camera (TOML)"),
+    ("b", Action::Bookmark, "write the camera alone, to return to it"),
+    ("Tab", Action::Panel, "show or hide the panel"),
+    ("?", Action::Help, "show or hide these keys"),
+    ("Escape", Action::Quit, "hide these keys, or close the window"),
 ];
 
 /// Returns the effect of a key.
 pub(crate) fn action_of(key: &str) -> Option<Action> {
     let key = if key.chars().count() == 1 { key.to_lowercase() } else { key.to_owned() };
     let of_sampler = || Sampler::ALL.iter().copied().find(|sampler| sampler.key() == key);
-    let known = KEYS.iter().find(|known| known.key == key).map(|known| known.action);
+    let known = KEYS.iter().find(|(known, ..)| *known == key).map(|(_, action, _)| *action);
     known.or_else(|| of_sampler().map(Action::Sampler))
 }
 
@@ -128,7 +114,7 @@ pub fn rows() -> Vec<(String, String)> {
     };
     let samplers = (named(Sampler::key, " "), format!("sampler: {}", named(Sampler::name, ", ")));
     let mut rows: Vec<(Vec<&str>, &str)> = Vec::new();
-    for Key { key, about, .. } in KEYS {
+    for (key, _, about) in KEYS {
         match rows.last_mut() {
             Some((keys, _)) if about.is_empty() => keys.push(key),
             _ => rows.push((vec![key], about)),
@@ -144,7 +130,7 @@ mod tests {
 
     #[test]
     fn keys_are_distinct_and_complete() {
-        let mut keys: Vec<&str> = KEYS.iter().map(|key| key.key).collect();
+        let mut keys: Vec<&str> = KEYS.iter().map(|(key, ..)| *key).collect();
         keys.extend(Sampler::ALL.iter().map(|sampler| sampler.key()));
         keys.sort_unstable();
         assert!(keys.windows(2).all(|pair| pair[0] != pair[1]), "{keys:?}");
