@@ -16,7 +16,7 @@ use std::{
 use winit::{
     application::ApplicationHandler,
     dpi::PhysicalSize,
-    event::{ElementState, MouseButton, MouseScrollDelta, StartCause, WindowEvent},
+    event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent},
     event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy},
     keyboard::{Key, NamedKey},
     raw_window_handle::HasDisplayHandle,
@@ -291,8 +291,6 @@ impl App {
 }
 
 impl ApplicationHandler<Report> for App {
-    fn new_events(&mut self, _event_loop: &ActiveEventLoop, _cause: StartCause) {}
-
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
         if let Err(error) = self.open(event_loop) {
             self.failure = Some(error);
