@@ -51,99 +51,77 @@ pub struct Arguments {
     #[arg(required = true, value_name = "SCENE|STUDY")]
     pub inputs: Vec<PathBuf>,
     /// Report folder; an interrupted study continues there.
-    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
-    #[arg(help_heading = OUTPUT)]
+    #[arg(short, long, value_name = "FOLDER", default_value = "report", help_heading = OUTPUT)]
     pub output: PathBuf,
     /// Samplers to compare; ratios are relative to the first. Parameters follow colons:
     /// mis,ris:candidates=8.
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    #[arg(help_heading = SAMPLING)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = SAMPLING)]
     pub samplers: Option<Vec<String>>,
     /// Compare at these numbers of samples per pixel.
-    #[arg(long, value_name = "N,…", value_delimiter = ',')]
-    #[arg(help_heading = STOPPING)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', help_heading = STOPPING)]
     pub spp: Option<Vec<u32>>,
     /// Compare after rendering for this much wall time: 500ms, 30s, 5m.
-    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
-    #[arg(help_heading = STOPPING)]
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration, help_heading = STOPPING)]
     pub time: Option<Duration>,
     /// Runs per sampler, with seeds 1, 2, … (default 3).
-    #[arg(long, value_name = "N")]
-    #[arg(help_heading = STOPPING)]
+    #[arg(long, value_name = "N", help_heading = STOPPING)]
     pub seeds: Option<u32>,
     /// Fail if loading a scene gives any warning, such as a part of a file that is left out.
-    #[arg(long)]
-    #[arg(help_heading = SCENE, hide_short_help = true)]
+    #[arg(long, help_heading = SCENE, hide_short_help = true)]
     pub strict: bool,
     /// Film size in pixels, overriding the scenes'.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    #[arg(help_heading = CAMERA)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = CAMERA)]
     pub size: Option<[u32; 2]>,
     /// Shadow rays traced at every vertex of a camera path (default 8 for guided, else 5).
-    #[arg(long, value_name = "N")]
-    #[arg(help_heading = SAMPLING, hide_short_help = true)]
+    #[arg(long, value_name = "N", help_heading = SAMPLING, hide_short_help = true)]
     pub shadow_rays: Option<u32>,
     /// Number of path vertices lit by the environment (default 8; 1 is direct light).
-    #[arg(long, value_name = "D")]
-    #[arg(help_heading = SAMPLING)]
+    #[arg(long, value_name = "D", help_heading = SAMPLING)]
     pub depth: Option<u32>,
     /// Sampler that renders the reference (default mis).
-    #[arg(long, value_name = "NAME")]
-    #[arg(help_heading = REFERENCE, hide_short_help = true)]
+    #[arg(long, value_name = "NAME", help_heading = REFERENCE, hide_short_help = true)]
     pub reference_sampler: Option<String>,
     /// Samples per pixel of the reference, both halves together (default 16 times the largest --spp).
-    #[arg(long, value_name = "N")]
-    #[arg(help_heading = REFERENCE)]
+    #[arg(long, value_name = "N", help_heading = REFERENCE)]
     pub reference_spp: Option<u32>,
     /// Reference to read instead of rendering one: an image, two independent halves (give it
     /// twice), or the report folder of another study.
-    #[arg(long, value_name = "EXR|FOLDER")]
-    #[arg(help_heading = REFERENCE)]
+    #[arg(long, value_name = "EXR|FOLDER", help_heading = REFERENCE)]
     pub reference: Vec<PathBuf>,
     /// Check the reference by an independent picture: a sampler, an EXR of another renderer, or off
     /// (default mis, or env for a reference by mis, in a tenth of the reference's time).
-    #[arg(long, value_name = "NAME|EXR|off")]
-    #[arg(help_heading = REFERENCE, hide_short_help = true)]
+    #[arg(long, value_name = "NAME|EXR|off", help_heading = REFERENCE, hide_short_help = true)]
     pub reference_check: Option<String>,
     /// Measure the extra time per sample over that of the first sampler, pass by pass.
-    #[arg(long)]
-    #[arg(help_heading = OVERHEAD)]
+    #[arg(long, help_heading = OVERHEAD)]
     pub overhead: bool,
     /// Sampler against which overhead is measured (default the first).
-    #[arg(long, value_name = "NAME")]
-    #[arg(help_heading = OVERHEAD, hide_short_help = true)]
+    #[arg(long, value_name = "NAME", help_heading = OVERHEAD, hide_short_help = true)]
     pub baseline: Option<String>,
     /// Interleaved overhead measurements per sampler (default 15).
-    #[arg(long, value_name = "N")]
-    #[arg(help_heading = OVERHEAD, hide_short_help = true)]
+    #[arg(long, value_name = "N", help_heading = OVERHEAD, hide_short_help = true)]
     pub repetitions: Option<u32>,
     /// Parameter for all samplers; `--set help` lists them. May be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    #[arg(help_heading = SAMPLING)]
+    #[arg(long, value_name = "KEY=VALUE", help_heading = SAMPLING)]
     pub set: Vec<String>,
     /// Run a small, fast version: the study file's quick settings, or an 80x60 film and few
     /// samples.
-    #[arg(long)]
-    #[arg(help_heading = STOPPING)]
+    #[arg(long, help_heading = STOPPING)]
     pub quick: bool,
     /// Discard finished runs in the folder that were made under other conditions.
-    #[arg(long)]
-    #[arg(help_heading = OUTPUT, hide_short_help = true)]
+    #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
     pub redo: bool,
     /// Device and tracer.
     #[command(flatten)]
     pub device: DeviceOptions,
     /// Run with the Vulkan validation layers; any message fails the command.
-    #[arg(long)]
-    #[arg(help_heading = MACHINE, hide_short_help = true)]
+    #[arg(long, help_heading = MACHINE, hide_short_help = true)]
     pub validate: bool,
     /// Also print the results as JSON to standard output.
-    #[arg(long)]
-    #[arg(help_heading = OUTPUT, hide_short_help = true)]
+    #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
     pub json: bool,
     /// Print errors only.
-    #[arg(short, long)]
-    #[arg(help_heading = OUTPUT)]
+    #[arg(short, long, help_heading = OUTPUT)]
     pub quiet: bool,
 }
 
