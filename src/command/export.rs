@@ -90,9 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     {
         return Err(Error::scene(&arguments.scene, format!("{difference} (--strict)")));
     }
-    for warning in scene.warnings.iter().chain(&export.summary()) {
-        log::warn!("{warning}");
-    }
+    scene.warnings.iter().chain(&export.summary()).for_each(|warning| log::warn!("{warning}"));
     export.write()?;
     super::print_line(&output.display().to_string())
 }

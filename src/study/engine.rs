@@ -87,9 +87,7 @@ impl Study<'_> {
             let heeded = samplers().find(|sampler| *sampler == Sampler::Portal);
             let ignored = heeded.or(samplers().next());
             let ignored = ignored.and_then(|sampler| sampler.portal_warning(&scene));
-            for warning in scene.warnings.iter().chain(&ignored) {
-                log::warn!("{warning}");
-            }
+            scene.warnings.iter().chain(&ignored).for_each(|warning| log::warn!("{warning}"));
             if let Some([width, height]) = self.plan.size {
                 (scene.film.width, scene.film.height) = (width, height);
             }
