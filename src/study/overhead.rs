@@ -12,7 +12,7 @@ use super::{
     contender::Contender,
     engine::{SharedBuffers, Study},
     plan::OverheadPlan,
-    runs::{Round, Timing, assignments},
+    runs::{Round, Timing, assignments, distinct},
     statistics::{Interval, median_interval},
 };
 use crate::{
@@ -138,14 +138,8 @@ pub struct PassOverhead {
 
 /// Computes the overhead of every sampler in every scene, in the order of the first round.
 pub fn overheads(rounds: &[Round], baseline: &str) -> Vec<Overhead> {
-    let mut scenes: Vec<&str> = Vec::new();
-    for round in rounds {
-        if !scenes.contains(&round.scene.as_str()) {
-            scenes.push(&round.scene);
-        }
-    }
     let mut all = Vec::new();
-    for scene in scenes {
+    for scene in distinct(rounds.iter().map(|round| round.scene.as_str())) {
         let rounds: Vec<&Round> = rounds.iter().filter(|round| round.scene == scene).collect();
         let Some(first) = rounds.first() else { continue };
         for timing in first.timings.iter().filter(|timing| timing.sampler != baseline) {

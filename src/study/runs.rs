@@ -79,6 +79,17 @@ pub(super) fn assignments(parameters: &BTreeMap<String, String>, separator: &str
     pairs.join(separator)
 }
 
+/// Lists values in the order in which they first occur.
+pub(super) fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
+    let mut found = Vec::new();
+    for value in values {
+        if !found.contains(&value) {
+            found.push(value);
+        }
+    }
+    found
+}
+
 /// Errors of a film after some samples.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {

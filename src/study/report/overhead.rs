@@ -6,46 +6,28 @@ use super::{
     plot::{self, STYLE_COUNT, Series},
     tables,
 };
-use crate::study::results::Report;
+use crate::study::{overhead::Overhead, results::Report, runs::distinct, statistics::Interval};
 
 /// Overhead against the share of blocked rays, and the tables.
 pub(crate) fn overhead_section(report: &Report) -> String {
     let Some(first) = report.overheads.first() else { return String::new() };
-    let mut samplers: Vec<&str> = Vec::new();
-    for overhead in &report.overheads {
-        if !samplers.contains(&overhead.sampler.as_str()) {
-            samplers.push(&overhead.sampler);
-        }
-    }
+    let samplers = distinct(report.overheads.iter().map(|overhead| overhead.sampler.as_str()));
     let style_of = |sampler: &str| {
         report.order.iter().position(|name| name == sampler).unwrap_or(STYLE_COUNT - 1)
     };
     let more = |ratio: f64| 100.0 * (ratio - 1.0);
-    let series: Vec<Series> = samplers
-        .iter()
-        .map(|sampler| Series {
-            style: style_of(sampler),
-            name: (*sampler).to_owned(),
-            points: report
-                .overheads
-                .iter()
-                .filter(|overhead| overhead.sampler == *sampler)
-                .filter_map(|overhead| {
-                    Some(plot::Point {
-                        x: 100.0 * overhead.blocked_share?,
-                        y: more(overhead.total.middle),
-                        low: more(overhead.total.low),
-                        high: more(overhead.total.high),
-                        label: if *sampler == samplers[0] {
-                            overhead.scene.clone()
-                        } else {
-                            String::new()
-                        },
-                    })
-                })
-                .collect(),
-        })
-        .collect();
+    let point = |overhead: &Overhead| {
+        let Interval { middle: y, low, high } = overhead.total.map(more);
+        let is_labelled = overhead.sampler == samplers[0];
+        let label = if is_labelled { overhead.scene.clone() } else { String::new() };
+        Some(plot::Point { x: 100.0 * overhead.blocked_share?, y, low, high, label })
+    };
+    let series_of = |sampler: &&str| {
+        let own = report.overheads.iter().filter(|overhead| overhead.sampler == *sampler);
+        let points = own.filter_map(point).collect();
+        Series { style: style_of(sampler), name: (*sampler).to_owned(), points }
+    };
+    let series: Vec<Series> = samplers.iter().map(series_of).collect();
     let ranges: Vec<plot::Range> = report
         .published_overheads
         .iter()

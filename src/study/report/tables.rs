@@ -10,6 +10,7 @@ use crate::study::{
     quality::{Figure, THRESHOLDS, TimeToQuality},
     results::Report,
     rule::Rule,
+    runs::distinct,
     statistics::Interval,
     summary::{SUSPICIOUS_DEVIATION, Summary},
     surfaces::Parts,
@@ -190,20 +191,14 @@ fn time_cell(time: &TimeToQuality) -> String {
 
 /// Tables of published figures beside the study's own, one for each source and scene.
 pub fn published(report: &Report) -> String {
-    let mut sources: Vec<(&str, &str)> = Vec::new();
-    for entry in &report.published_errors {
-        let key = (entry.source.as_str(), entry.scene.as_str());
-        let is_studied = report.scenes.iter().any(|scene| scene.name == entry.scene);
-        if is_studied && !sources.contains(&key) {
-            sources.push(key);
-        }
-    }
     let mut html = String::new();
-    for (source, scene) in sources {
+    let keys = report.published_errors.iter().map(|entry| (&entry.source, &entry.scene));
+    let is_studied = |scene: &String| report.scenes.iter().any(|studied| studied.name == *scene);
+    for (source, scene) in distinct(keys.filter(|(_, scene)| is_studied(scene))) {
         let entries: Vec<_> = report
             .published_errors
             .iter()
-            .filter(|entry| entry.source == source && entry.scene == scene)
+            .filter(|entry| entry.source == *source && entry.scene == *scene)
             .collect();
         let names: Vec<&String> = report
             .order
