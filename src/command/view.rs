@@ -101,7 +101,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         settings,
         spp: arguments.spp,
         tone: Tone { exposure: arguments.exposure, curve: arguments.curve },
-        folder: PathBuf::new(),
     };
     display.run(scene, options)
 }

@@ -33,19 +33,19 @@ pub(super) fn camera_toml(camera: &Camera) -> String {
     text
 }
 
-/// Names of the files of one press of the key: `NAME.view-1.png`, `.exr` and `.toml`, with the first number
-/// that none of them has.
-pub(super) fn names(folder: &Path, scene: &str) -> [PathBuf; 3] {
+/// Names of the files of one press of the key, in the working folder: `NAME.view-1.png`, `.exr` and `.toml`,
+/// with the first number that none of them has.
+pub(super) fn names(scene: &str) -> [PathBuf; 3] {
     let of = |number: u32| {
-        ["png", "exr", "toml"].map(|kind| folder.join(format!("{scene}.view-{number}.{kind}")))
+        ["png", "exr", "toml"].map(|kind| format!("{scene}.view-{number}.{kind}").into())
     };
-    let is_free = |number: &u32| of(*number).iter().all(|path| !path.exists());
+    let is_free = |number: &u32| of(*number).iter().all(|path: &PathBuf| !path.exists());
     of((1..u32::MAX).find(is_free).unwrap_or(u32::MAX))
 }
 
 /// Returns the files of cameras that the window of a scene has written, by number.
-pub(super) fn views(folder: &Path, scene: &str) -> Vec<PathBuf> {
-    let of = |number: u32| folder.join(format!("{scene}.view-{number}.toml"));
+pub(super) fn views(scene: &str) -> Vec<PathBuf> {
+    let of = |number: u32| PathBuf::from(format!("{scene}.view-{number}.toml"));
     (1..=MOST_VIEWS).map(of).filter(|file| file.exists()).collect()
 }
 

@@ -3,7 +3,6 @@
 use std::{
     cell::RefCell,
     collections::BTreeSet,
-    path::PathBuf,
     rc::Rc,
     sync::{
         Arc,
@@ -68,8 +67,6 @@ pub struct Options {
     pub spp: u32,
     /// Exposure and curve at the start.
     pub tone: Tone,
-    /// Folder of the files that a key writes.
-    pub folder: PathBuf,
 }
 
 /// Message from the rendering thread.
@@ -376,7 +373,7 @@ fn render(
     (window, size): (Arc<Window>, [u32; 2]),
     proxy: EventLoopProxy<Report>,
 ) -> Result<()> {
-    let Options { device: wanted, tracer, validate, check, settings, spp, tone, folder } = options;
+    let Options { device: wanted, tracer, validate, check, settings, spp, tone } = options;
     let display = window.display_handle().map_err(|error| no_window(&error))?.as_raw();
     let device = Device::open_checked(wanted.as_deref(), validate, tracer, Some(display), check)?;
     let projector = Projector::new(&device, [scene.film.width, scene.film.height], inset::SIZE)?;
@@ -386,8 +383,7 @@ fn render(
     let announce = Box::new(move |status| {
         let _ = proxy.send_event(Report::Status(Box::new(status)));
     });
-    let parts =
-        Parts { scene, device: Arc::clone(&device), settings, spp, left, panel, folder, announce };
+    let parts = Parts { scene, device: Arc::clone(&device), settings, spp, left, panel, announce };
     let mut worker = Worker::new(parts);
     let result = worker.run();
     device.save_pipeline_cache();

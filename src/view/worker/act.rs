@@ -85,7 +85,7 @@ impl Worker {
                 return Ok(true);
             }
             Action::Bookmark => {
-                let [.., file] = names(&self.parts.folder, &self.parts.scene.name);
+                let [.., file] = names(&self.parts.scene.name);
                 let written = write_text(&file, &camera_toml(&self.rig.camera));
                 self.notice_written(written, &[file]);
             }
@@ -170,7 +170,7 @@ impl Worker {
                 self.notice = error.to_string();
             }
         }
-        self.views = views(&self.parts.folder, &self.parts.scene.name);
+        self.views = views(&self.parts.scene.name);
         self.tell();
     }
 
@@ -264,7 +264,7 @@ impl Worker {
         }
         let (size, pixels) = self.parts.panel.borrow_mut().picture()?;
         let film = self.parts.left.session.image(&[])?;
-        let files = names(&self.parts.folder, &self.parts.scene.name);
+        let files = names(&self.parts.scene.name);
         let written = write(&files, (size, &pixels), &film, &self.rig.camera);
         self.notice_written(written, &files);
         Ok(())

@@ -117,8 +117,6 @@ pub(super) struct Parts {
     pub left: Side,
     /// The window.
     pub panel: Rc<RefCell<Panel>>,
-    /// Folder of the files that are written.
-    pub folder: PathBuf,
     /// Shows what the renderer does.
     pub announce: Box<dyn Fn(Status)>,
 }
@@ -129,7 +127,7 @@ impl Worker {
         let seed = parts.settings.seed;
         let mut worker = Self {
             rig: Rig::new(parts.scene.camera),
-            views: views(&parts.folder, &parts.scene.name),
+            views: views(&parts.scene.name),
             parts,
             right: None,
             right_sampler: Sampler::Mis,
