@@ -50,6 +50,15 @@ impl DeviceOptions {
     pub(crate) fn open(&self, validate: bool) -> Result<Arc<Device>> {
         Device::open_checked(self.device.as_deref(), validate, self.tracer, None, self_test::check)
     }
+
+    /// Opens the device and prints it, unless `quiet`. Fails as [`DeviceOptions::open`].
+    pub(crate) fn announce(&self, validate: bool, quiet: bool) -> Result<Arc<Device>> {
+        let device = self.open(validate)?;
+        if !quiet {
+            self_test::announce(&device);
+        }
+        Ok(device)
+    }
 }
 
 /// Options of what a scene file may leave open.

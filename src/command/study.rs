@@ -13,7 +13,6 @@ use super::{
     },
     progress::Progress,
     render::Display,
-    self_test,
 };
 use crate::{
     error::{Error, Result},
@@ -166,10 +165,7 @@ pub fn run_with<O: Observer>(
     let folder = Folder::open(&arguments.output)?;
     let inputs = arguments.inputs.iter().map(PathBuf::as_path).chain(plan.pictures());
     folder.check_replaces_nothing(&inputs.collect::<Vec<_>>())?;
-    let device = arguments.device.open(arguments.validate)?;
-    if !arguments.quiet {
-        self_test::announce(&device);
-    }
+    let device = arguments.device.announce(arguments.validate, arguments.quiet)?;
     let (results, end) = engine::run(&plan, &folder, &device, &mut observer, arguments.redo)?;
     ended(observer, end.as_ref());
 

@@ -19,7 +19,6 @@ use preview::Preview;
 use super::{
     interrupt::Interrupt,
     progress::{Patience, Progress},
-    self_test,
 };
 use crate::{
     error::{Error, Result},
@@ -168,7 +167,8 @@ impl Sequence {
         if let Some(device) = &self.device {
             return Ok(Arc::clone(device));
         }
-        Ok(Arc::clone(self.device.insert(open(arguments)?)))
+        let device = arguments.device.announce(arguments.validate, arguments.quiet)?;
+        Ok(Arc::clone(self.device.insert(device)))
     }
 
     /// Logs a warning, for the first frame that has it.
@@ -177,14 +177,6 @@ impl Sequence {
             log::warn!("{warning}");
         }
     }
-}
-
-fn open(arguments: &Arguments) -> Result<Arc<Device>> {
-    let device = arguments.device.open(arguments.validate)?;
-    if !arguments.quiet {
-        self_test::announce(&device);
-    }
-    Ok(device)
 }
 
 fn prepare(
@@ -224,7 +216,7 @@ pub fn film(
         observer.notice(&Event::Note(&line));
     }
     let aovs = settings.aovs.clone();
-    let device = open(arguments)?;
+    let device = arguments.device.announce(arguments.validate, arguments.quiet)?;
     if let Some(warning) = settings.sampler.portal_warning(scene) {
         log::warn!("{warning}");
     }
