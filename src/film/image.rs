@@ -51,7 +51,7 @@ impl Sums {
                 Aov::Unfiltered | Aov::Albedo | Aov::Normal | Aov::Position | Aov::GuideCell => {
                     let layers = TRIPLES.iter().zip(self.triples());
                     for (layer, sums) in layers.filter(|(layer, _)| layer.aov == Some(*aov)) {
-                        // The layer of a checkpoint is called by its mean's name, and a sum.
+                        // `AlbedoSum` of a checkpoint is the sum behind the mean `Albedo`.
                         let names = layer.channels.map(|channel| channel.replace("Sum", ""));
                         insert_means(&mut image, names.each_ref().map(String::as_str), sums);
                     }
