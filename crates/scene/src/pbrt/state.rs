@@ -15,9 +15,10 @@ use crate::error::Result;
 const MAX_SAVED: usize = 1 << 12;
 
 /// Material that shapes take.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) enum MaterialChoice {
     /// That of pbrt where a file chooses none: diffuse, 0.5.
+    #[default]
     Default,
     Own(Rc<Entity>),
     Named(Rc<str>, Place),
@@ -66,7 +67,7 @@ impl Attributes {
 }
 
 /// Settings that the next shape or light takes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct State {
     /// Current transformation matrix: world from object, or camera from world before `Camera`.
     pub ctm: DMat4,
@@ -79,19 +80,6 @@ pub(super) struct State {
     pub interior: Option<String>,
     /// Parameters from `Attribute`.
     pub attributes: Attributes,
-}
-
-impl Default for State {
-    fn default() -> Self {
-        Self {
-            ctm: DMat4::IDENTITY,
-            reverse: false,
-            material: MaterialChoice::Default,
-            area_light: None,
-            interior: None,
-            attributes: Attributes::default(),
-        }
-    }
 }
 
 /// Directive that saves the state, and that ends at its own counterpart.
