@@ -7,7 +7,7 @@ use glam::{DMat4, DVec3};
 use super::{
     parameters::{Entity, read_parameters},
     source::{Part, Source},
-    state::{MaterialChoice, Saved, States, look_at, rotation},
+    state::{MaterialChoice, Saved, States, look_at},
     tokens::{Place, Token},
 };
 use crate::{
@@ -145,10 +145,10 @@ impl<'a> Reader<'a> {
             "Identity" | "Translate" | "Scale" | "Rotate" | "LookAt" | "Transform"
             | "ConcatTransform" | "CoordinateSystem" | "CoordSysTransform" | "ActiveTransform"
             | "TransformTimes" => self.transformation(name, &place),
-            "AttributeBegin" => self.states.save(Saved::Attribute, place),
-            "AttributeEnd" => self.states.restore(Saved::Attribute, &place),
-            "TransformBegin" => self.states.save(Saved::Transform, place),
-            "TransformEnd" => self.states.restore(Saved::Transform, &place),
+            "AttributeBegin" => self.states.save(Saved::AttributeBegin, place),
+            "AttributeEnd" => self.states.restore(Saved::AttributeBegin, &place),
+            "TransformBegin" => self.states.save(Saved::TransformBegin, place),
+            "TransformEnd" => self.states.restore(Saved::TransformBegin, &place),
             "Attribute" => {
                 let target = self.text("Attribute")?;
                 let parameters = read_parameters(&mut self.source)?;
@@ -271,10 +271,11 @@ impl<'a> Reader<'a> {
             }
             "Scale" => ctm * DMat4::from_scale(DVec3::from_array(self.numbers("Scale")?)),
             "Rotate" => {
-                let [angle, x, y, z] = self.numbers("Rotate")?;
-                let turn = rotation(angle, DVec3::new(x, y, z))
-                    .ok_or_else(|| place.error("Rotate: expected an axis with a direction"))?;
-                ctm * turn
+                let [angle_deg, x, y, z] = self.numbers("Rotate")?;
+                let axis = DVec3::new(x, y, z).try_normalize();
+                let axis =
+                    axis.ok_or_else(|| place.error("Rotate: expected an axis with a direction"))?;
+                ctm * DMat4::from_axis_angle(axis, angle_deg.to_radians())
             }
             "LookAt" => {
                 let [a, b, c, d, e, f, g, h, i] = self.numbers("LookAt")?;
@@ -335,7 +336,7 @@ impl<'a> Reader<'a> {
         self.check_world(directive, &place)?;
         if directive == "ObjectEnd" {
             self.object = None;
-            return self.states.restore(Saved::Object, &place);
+            return self.states.restore(Saved::ObjectBegin, &place);
         }
         let name = self.text(directive)?;
         let index = self.object_index(name.clone());
@@ -352,7 +353,7 @@ impl<'a> Reader<'a> {
             return Err(place.error(format!("object `{name}` is defined twice")));
         }
         self.object = Some(index);
-        self.states.save(Saved::Object, place)
+        self.states.save(Saved::ObjectBegin, place)
     }
 
     /// Reads a directive of the part before `WorldBegin`.

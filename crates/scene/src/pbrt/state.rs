@@ -82,25 +82,15 @@ pub(super) struct State {
     pub attributes: Attributes,
 }
 
-/// Directive that saves the state, and that ends at its own counterpart.
+/// Directive that saves the state, and that ends at its own counterpart; messages give its name as it
+/// stands here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Saved {
-    Attribute,
-    /// `TransformBegin`: restores the matrix alone.
-    Transform,
-    Object,
+    AttributeBegin,
+    /// Restores the matrix alone.
+    TransformBegin,
+    ObjectBegin,
     Import,
-}
-
-impl Saved {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Attribute => "AttributeBegin",
-            Self::Transform => "TransformBegin",
-            Self::Object => "ObjectBegin",
-            Self::Import => "Import",
-        }
-    }
 }
 
 /// States saved by directives that have not ended yet.
@@ -133,7 +123,7 @@ impl States {
     pub(super) fn restore(&mut self, why: Saved, place: &Place) -> Result<()> {
         match self.saved.pop() {
             Some((found, state, _)) if found == why => {
-                if why == Saved::Transform {
+                if why == Saved::TransformBegin {
                     self.now.ctm = state.ctm;
                 } else {
                     self.now = state;
@@ -141,8 +131,7 @@ impl States {
                 Ok(())
             }
             Some((found, _, begin)) => Err(place.error(format!(
-                "an end without its beginning: the block open here is the {} of line {}",
-                found.name(),
+                "an end without its beginning: the block open here is the {found:?} of line {}",
                 begin.line
             ))),
             None => Err(place.error("an end without its beginning")),
@@ -156,17 +145,11 @@ impl States {
     pub(super) fn check_end(&self) -> Result<()> {
         match self.saved.last() {
             Some((why, _, place)) => {
-                Err(place.error(format!("{} without an end in the file", why.name())))
+                Err(place.error(format!("{why:?} without an end in the file")))
             }
             None => Ok(()),
         }
     }
-}
-
-/// Rotation about an axis by an angle in degrees, counter-clockwise seen against the axis; none for
-/// an axis without direction.
-pub(super) fn rotation(angle_deg: f64, axis: DVec3) -> Option<DMat4> {
-    Some(DMat4::from_axis_angle(axis.try_normalize()?, angle_deg.to_radians()))
 }
 
 /// Camera from world for a viewer at `eye` that looks to `target`; none if these coincide or `up`
