@@ -5,7 +5,7 @@ use std::{collections::HashMap, path::Path, rc::Rc};
 use glam::{DMat4, DVec3};
 
 use super::{
-    parameters::{Entity, read_parameters},
+    parameters::{Entity, Parameter, read_parameters},
     source::{Part, Source},
     state::{MaterialChoice, Saved, States, look_at},
     tokens::{Place, Token},
@@ -58,10 +58,8 @@ pub(super) struct Description {
     pub filter: Option<Entity>,
     pub integrator: Option<Entity>,
     pub sampler: Option<Entity>,
-    /// `Texture` of type `float`, by name.
-    pub float_textures: HashMap<String, Entity>,
-    /// `Texture` of type `spectrum`, by name.
-    pub spectrum_textures: HashMap<String, Entity>,
+    /// `Texture` by its name, those of type `float` apart from those of type `spectrum`.
+    pub textures: HashMap<(bool, String), Entity>,
     /// `MakeNamedMaterial`.
     pub materials: HashMap<String, Entity>,
     /// `MakeNamedMedium`.
@@ -179,8 +177,8 @@ impl<'a> Reader<'a> {
             "Camera" | "Film" | "PixelFilter" | "Integrator" | "Sampler" | "Accelerator"
             | "Option" | "ColorSpace" => self.option(name, place),
             "Shape" | "LightSource" | "AreaLightSource" | "Material" | "NamedMaterial"
-            | "MakeNamedMaterial" | "Texture" => {
-                if name != "MakeNamedMaterial" && name != "Texture" {
+            | "MakeNamedMaterial" | "MakeNamedMedium" | "Texture" => {
+                if !matches!(name, "MakeNamedMaterial" | "MakeNamedMedium" | "Texture") {
                     self.check_world(name, &place)?;
                 }
                 self.entity(name, place)
@@ -195,15 +193,6 @@ impl<'a> Reader<'a> {
                 } else if token.is_some() && !self.source.text().is_empty() {
                     self.ignore(features::PBRT_MEDIUM, features::PBRT_MEDIUM.name, &place);
                 }
-                Ok(())
-            }
-            "MakeNamedMedium" => {
-                let kind = self.text(name)?;
-                let attributes = self.states.now.attributes.clone();
-                let inherited = attributes.of("medium");
-                let (source, name) = (&mut self.source, kind.clone());
-                let entity = Entity::read(source, "MakeNamedMedium", name, place, inherited)?;
-                self.description.media.insert(kind, entity);
                 Ok(())
             }
             _ => Err(place.error(format!(
@@ -437,29 +426,26 @@ impl<'a> Reader<'a> {
                     return Err(error);
                 }
             }
-            _ => self.texture(kind, place)?,
+            "MakeNamedMedium" => {
+                let entity = read("MakeNamedMedium", "medium", kind.clone(), place)?;
+                self.description.media.insert(kind, entity);
+            }
+            _ => self.texture(kind, place, now.attributes.of("texture"))?,
         }
         Ok(())
     }
 
     /// Reads `Texture "name" "float" "imagemap"` from its second string on.
-    fn texture(&mut self, name: String, place: Place) -> Result<()> {
+    fn texture(&mut self, name: String, place: Place, inherited: &[Parameter]) -> Result<()> {
         let values = self.text("Texture")?;
         let kind = self.text("Texture")?;
-        let attributes = self.states.now.attributes.clone();
-        let inherited = attributes.of("texture");
         let entity = Entity::read(&mut self.source, "Texture", kind, place, inherited)?;
-        let textures = match values.as_str() {
-            "float" => &mut self.description.float_textures,
-            "spectrum" => &mut self.description.spectrum_textures,
-            _ => {
-                let message =
-                    format!("`{name}`: expected values of float or spectrum, found {values}");
-                return Err(entity.error(message));
-            }
-        };
+        if !["float", "spectrum"].contains(&values.as_str()) {
+            let message = format!("`{name}`: expected values of float or spectrum, found {values}");
+            return Err(entity.error(message));
+        }
         let error = entity.error(format!("the name `{name}` is taken by another texture"));
-        if textures.insert(name, entity).is_some() {
+        if self.description.textures.insert((values == "float", name), entity).is_some() {
             return Err(error);
         }
         Ok(())

@@ -49,12 +49,6 @@ impl Value {
     }
 }
 
-/// Encoding of 8-bit colours, and the exponent of one that is neither of [`Encoding`].
-struct Decoding {
-    encoding: Encoding,
-    gamma: Option<f32>,
-}
-
 /// Textures of a scene, with the images read so far.
 pub(super) struct Textures<'a> {
     description: &'a Description,
@@ -109,12 +103,8 @@ impl<'a> Textures<'a> {
     /// Texture that a parameter names.
     fn named(&mut self, parameter: &Parameter, is_number: bool) -> Result<Value> {
         let name = parameter.text();
-        let textures = if is_number {
-            &self.description.float_textures
-        } else {
-            &self.description.spectrum_textures
-        };
-        let Some(entity) = textures.get(name) else {
+        let key = (is_number, name.to_owned());
+        let Some(entity) = self.description.textures.get(&key) else {
             let kind = if is_number { "float" } else { "spectrum" };
             let message = format!("parameter `{}`: there is no {kind} texture", parameter.name);
             return Err(parameter.place.error(format!("{message} `{name}`")));
@@ -123,7 +113,6 @@ impl<'a> Textures<'a> {
             let message = format!("more than {MAX_DEPTH} textures refer to one another");
             return Err(entity.error(message));
         }
-        let key = (is_number, name.to_owned());
         if let Some(value) = self.values.get(&key) {
             return Ok(value.clone());
         }
@@ -213,13 +202,13 @@ impl<'a> Textures<'a> {
         let Some(file) = entity.string("filename")? else {
             return Err(entity.error("expected a `filename`"));
         };
-        let decoding = decoding(entity)?;
-        let texture = self.load(entity, file, &decoding)?;
+        let (encoding, gamma) = decoding(entity)?;
+        let texture = self.load(entity, file, gamma)?;
         let ([du, u], [dv, v]) = mapping(entity, &mut self.log)?;
         let mut image = TextureUse {
             // v points up in pbrt, down in images.
             image_from_uv: [[u, 0.0, du], [0.0, -v, 1.0 - dv]],
-            encoding: decoding.encoding,
+            encoding,
             ..TextureUse::new(texture)
         };
         image.interpolation = match entity.string("filter")?.unwrap_or("bilinear") {
@@ -251,18 +240,16 @@ impl<'a> Textures<'a> {
         Ok(value)
     }
 
-    /// Reads an image file once for each way of decoding it.
-    fn load(&mut self, entity: &Entity, file: &str, decoding: &Decoding) -> Result<Arc<Texture>> {
+    /// Reads an image file once for each exponent that decodes its 8-bit colours, if one does.
+    fn load(&mut self, entity: &Entity, file: &str, gamma: Option<f32>) -> Result<Arc<Texture>> {
         let path = self.folder.file(file).map_err(|message| entity.error(message))?;
-        let key = (path.clone(), format!("{:?}", decoding.gamma));
+        let key = (path.clone(), format!("{gamma:?}"));
         if let Some(texture) = self.images.get(&key) {
             return Ok(Arc::clone(texture));
         }
         let loaded = Texture::load(&path, &mut self.log.warnings);
         let mut texture = loaded.map_err(|error| entity.error(error.to_string()))?;
-        if let (Some(gamma), Texels::Bytes(_) | Texels::Shorts(_)) =
-            (decoding.gamma, &texture.texels)
-        {
+        if let (Some(gamma), Texels::Bytes(_) | Texels::Shorts(_)) = (gamma, &texture.texels) {
             let decoded = |[red, green, blue, alpha]: [f32; 4]| {
                 let [red, green, blue] = [red, green, blue].map(|value| value.powf(gamma));
                 [red, green, blue, alpha].map(f16::from_f32)
@@ -282,8 +269,7 @@ impl<'a> Textures<'a> {
     /// With the place for an image that cannot be read.
     pub(super) fn normal_map(&mut self, entity: &Entity) -> Result<Option<TextureUse>> {
         let Some(file) = entity.string("normalmap")? else { return Ok(None) };
-        let decoding = Decoding { encoding: Encoding::Linear, gamma: None };
-        let texture = self.load(entity, file, &decoding)?;
+        let texture = self.load(entity, file, None)?;
         let encoding = Encoding::Linear;
         Ok(Some(TextureUse { encoding, ..TextureUse::from_lower_left(texture) }))
     }
@@ -294,19 +280,18 @@ impl<'a> Textures<'a> {
     /// With the place for an image that cannot be read.
     pub(super) fn light_image(&mut self, entity: &Entity) -> Result<Option<TextureUse>> {
         let Some(file) = entity.string("filename")? else { return Ok(None) };
-        let decoding = Decoding { encoding: Encoding::Srgb, gamma: None };
-        let texture = self.load(entity, file, &decoding)?;
+        let texture = self.load(entity, file, None)?;
         let wrap = [Wrap::Clamp; 2];
         Ok(Some(TextureUse { wrap, ..TextureUse::from_lower_left(texture) }))
     }
 }
 
-fn decoding(entity: &Entity) -> Result<Decoding> {
-    let linear = Decoding { encoding: Encoding::Linear, gamma: None };
+/// Encoding of 8-bit colours, and the exponent of one that is neither of [`Encoding`].
+fn decoding(entity: &Entity) -> Result<(Encoding, Option<f32>)> {
     // Only 8-bit colours are encoded; other texels are linear whatever this says.
     match entity.string("encoding")?.unwrap_or("sRGB") {
-        "sRGB" => Ok(Decoding { encoding: Encoding::Srgb, gamma: None }),
-        "linear" => Ok(linear),
+        "sRGB" => Ok((Encoding::Srgb, None)),
+        "linear" => Ok((Encoding::Linear, None)),
         other => {
             let gamma = other.strip_prefix("gamma ").and_then(|gamma| gamma.trim().parse().ok());
             let gamma = gamma.filter(|gamma: &f32| *gamma > 0.0 && gamma.is_finite());
@@ -314,7 +299,7 @@ fn decoding(entity: &Entity) -> Result<Decoding> {
                 let expected = "expected the encoding sRGB, linear or gamma with a number";
                 entity.error(format!("{expected}, found `{other}`"))
             };
-            Ok(Decoding { gamma: Some(gamma.ok_or_else(error)?), ..linear })
+            Ok((Encoding::Linear, Some(gamma.ok_or_else(error)?)))
         }
     }
 }
