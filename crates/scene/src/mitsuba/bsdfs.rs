@@ -29,19 +29,6 @@ pub(super) const LEAST_COAT_IOR: f32 = 1.01;
 pub(super) const MAX_COAT_IOR: f32 = 4.0;
 const IOR_RANGE: (f32, f32) = (0.1, 10.0);
 
-/// Name of a model of today for one of versions up to 0.2.
-fn current_name(kind: &str) -> &str {
-    match kind {
-        "lambertian" => "diffuse",
-        "mirror" => "conductor",
-        "roughmetal" => "roughconductor",
-        "roughglass" => "roughdielectric",
-        "microfacet" => "roughplastic",
-        "composite" => "mixturebsdf",
-        kind => kind,
-    }
-}
-
 pub(super) struct Width {
     pub alpha: f32,
     /// Factor of √α, for which `alpha` is then 1.
@@ -97,11 +84,12 @@ impl Reader {
 
     fn model_of(&mut self, node: Node<'_>) -> Result<Model> {
         let parameters = Parameters::new(node);
-        let model = match current_name(node.kind()) {
+        // Names as `lambertian` and `microfacet` are those of versions up to 0.2.
+        let model = match node.kind() {
             "twosided" => self.two_sided(&parameters)?,
             "mask" => self.mask(&parameters)?,
             "blendbsdf" => self.blend(&parameters)?,
-            "mixturebsdf" => self.mixture(&parameters)?,
+            "mixturebsdf" | "composite" => self.mixture(&parameters)?,
             "coating" | "roughcoating" => self.coating(&parameters)?,
             "bumpmap" | "bump" => self.bump_map(&parameters)?,
             "normalmap" => self.normal_map(&parameters)?,
@@ -112,7 +100,7 @@ impl Reader {
                     ..Surface::default()
                 },
             },
-            "diffuse" => {
+            "diffuse" | "lambertian" => {
                 let value = match self.value(&parameters, "reflectance", Role::Reflectance)? {
                     Some(value) => value,
                     None => {
@@ -128,20 +116,20 @@ impl Reader {
             }
             "phong" | "ward" => self.phong(&parameters)?,
             "plastic" => self.plastic(&parameters, None)?,
-            "roughplastic" | "pplastic" => {
+            "roughplastic" | "microfacet" | "pplastic" => {
                 if node.kind() == "pplastic" {
                     self.ignored.add(features::MI_POLARIZED, || node.place());
                 }
                 let width = self.width(&parameters)?;
                 self.plastic(&parameters, Some(width))?
             }
-            "conductor" => self.conductor(&parameters, None)?,
-            "roughconductor" => {
+            "conductor" | "mirror" => self.conductor(&parameters, None)?,
+            "roughconductor" | "roughmetal" => {
                 let Width { alpha, texture } = self.width(&parameters)?;
                 self.conductor(&parameters, Some(alpha))?.of_roughness(texture)
             }
             "dielectric" => self.dielectric(&parameters, 0.0)?,
-            "roughdielectric" => {
+            "roughdielectric" | "roughglass" => {
                 let Width { alpha, texture } = self.width(&parameters)?;
                 self.dielectric(&parameters, alpha)?.of_roughness(texture)
             }

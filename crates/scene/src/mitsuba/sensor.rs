@@ -12,28 +12,6 @@ const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
 /// Vertical fields of view that a camera may have, degrees.
 const FOV_RANGE_DEG: (f64, f64) = (0.01, 179.0);
 
-/// Integrators of light along paths, however they find it.
-const PATH_INTEGRATORS: [&str; 16] = [
-    "path",
-    "volpath",
-    "volpathmis",
-    "volpath_simple",
-    "bdpt",
-    "ptracer",
-    "pssmlt",
-    "mlt",
-    "erpt",
-    "photonmapper",
-    "ppm",
-    "sppm",
-    "prb",
-    "prbvolpath",
-    "prb_basic",
-    "path_guided",
-];
-/// Integrators around another, which is in them.
-const AROUND_INTEGRATORS: [&str; 5] = ["aov", "moment", "adaptive", "irrcache", "stokes"];
-
 /// Film with the part of it that is rendered.
 struct Film {
     settings: FilmSettings,
@@ -112,22 +90,28 @@ impl Reader {
         if parameters.boolean("hide_emitters")? == Some(true) {
             self.ignored.add(features::MI_HIDE_EMITTERS, || node.place());
         }
-        let kind = node.kind();
-        if kind == "direct" {
-            self.asked.depth = Some(1);
-        } else if PATH_INTEGRATORS.contains(&kind) {
-            // Mitsuba counts the edges of a path, the one to the light included.
-            self.asked.depth = match parameters.integer("max_depth")? {
-                None => self.asked.depth,
-                Some(-1) => Some(Asked::MAX_DEPTH),
-                Some(edges) => Some((edges - 1).clamp(1, i64::from(Asked::MAX_DEPTH)) as u32),
-            };
-            let roulette = parameters.integer("rr_depth")?;
-            let roulette = roulette.and_then(|depth| u32::try_from(depth).ok());
-            self.asked.roulette_depth = roulette.or(self.asked.roulette_depth);
-        } else if !AROUND_INTEGRATORS.contains(&kind) {
-            let name = format!("integrator `{kind}`");
-            self.ignored.add_named(features::MI_INTEGRATOR, &name, || node.place());
+        match node.kind() {
+            "direct" => self.asked.depth = Some(1),
+            // All find light along paths, however they do.
+            "path" | "volpath" | "volpathmis" | "volpath_simple" | "bdpt" | "ptracer"
+            | "pssmlt" | "mlt" | "erpt" | "photonmapper" | "ppm" | "sppm" | "prb"
+            | "prbvolpath" | "prb_basic" | "path_guided" => {
+                // Mitsuba counts the edges of a path, the one to the light included.
+                self.asked.depth = match parameters.integer("max_depth")? {
+                    None => self.asked.depth,
+                    Some(-1) => Some(Asked::MAX_DEPTH),
+                    Some(edges) => Some((edges - 1).clamp(1, i64::from(Asked::MAX_DEPTH)) as u32),
+                };
+                let roulette = parameters.integer("rr_depth")?;
+                let roulette = roulette.and_then(|depth| u32::try_from(depth).ok());
+                self.asked.roulette_depth = roulette.or(self.asked.roulette_depth);
+            }
+            // The integrator in them has been read.
+            "aov" | "moment" | "adaptive" | "irrcache" | "stokes" => {}
+            kind => {
+                let name = format!("integrator `{kind}`");
+                self.ignored.add_named(features::MI_INTEGRATOR, &name, || node.place());
+            }
         }
         Ok(())
     }
@@ -251,22 +235,13 @@ impl Reader {
         let filters = film.objects("rfilter")?;
         let Some(&node) = filters.first() else { return Ok(Filter::Gaussian) };
         let parameters = Parameters::new(node);
-        let is_ours = match node.kind() {
-            "box" => {
-                let radius = parameters.float("radius")?.unwrap_or(0.5);
-                if (radius - 0.5).abs() < 1e-6 {
-                    parameters.finish(&mut self.ignored);
-                    return Ok(Filter::Box);
-                }
-                false
-            }
-            "gaussian" => {
-                let deviation = parameters.float("stddev")?.unwrap_or(0.5);
-                (deviation - 0.5).abs() < 1e-6
-            }
+        let is_half = |name: &str| Ok((parameters.float(name)?.unwrap_or(0.5) - 0.5).abs() < 1e-6);
+        let (filter, is_ours) = match node.kind() {
+            "box" => (Filter::Box, is_half("radius")?),
+            "gaussian" => (Filter::Gaussian, is_half("stddev")?),
             "tent" | "mitchell" | "catmullrom" | "lanczos" => {
                 parameters.without_effect(&["radius", "B", "C", "b", "c", "lobes"]);
-                false
+                (Filter::Gaussian, false)
             }
             found => {
                 let expected = "expected box, gaussian, tent, mitchell, catmullrom or lanczos";
@@ -279,7 +254,7 @@ impl Reader {
             self.ignored.add_named(features::MI_FILTER, &name, || node.place());
         }
         parameters.finish(&mut self.ignored);
-        Ok(Filter::Gaussian)
+        Ok(if is_ours { filter } else { Filter::Gaussian })
     }
 }
 

@@ -17,20 +17,6 @@ use crate::{
     transform::Transform,
 };
 
-/// Shapes that are read, beside instances of groups.
-const SHAPES: [&str; 11] = [
-    "obj",
-    "ply",
-    "serialized",
-    "rectangle",
-    "cube",
-    "sphere",
-    "disk",
-    "cylinder",
-    "bsplinecurve",
-    "linearcurve",
-    "hair",
-];
 /// Most groups in one another; Mitsuba allows one.
 const MAX_GROUPS: usize = 4;
 
@@ -99,11 +85,14 @@ impl Reader {
     /// Tests for a shape that can be read, and names one that cannot: of an unknown kind, or of a file that
     /// is not there.
     fn can_be_read(&mut self, node: Node<'_>) -> Result<bool> {
-        let kind = node.kind();
-        if !SHAPES.contains(&kind) {
-            let name = format!("shapes of the kind `{kind}`");
-            self.ignored.add_named(features::MI_SHAPE, &name, || node.place());
-            return Ok(false);
+        match node.kind() {
+            "obj" | "ply" | "serialized" | "rectangle" | "cube" | "sphere" | "disk"
+            | "cylinder" | "bsplinecurve" | "linearcurve" | "hair" => {}
+            kind => {
+                let name = format!("shapes of the kind `{kind}`");
+                self.ignored.add_named(features::MI_SHAPE, &name, || node.place());
+                return Ok(false);
+            }
         }
         let Some(name) = Parameters::new(node).string("filename")? else { return Ok(true) };
         let is_there = node.file_if_there(name)?.is_some();
