@@ -87,13 +87,9 @@ pub(crate) fn blend_lobes(
         Share::Image(image) => Some(image),
         Share::Constant(_) => None,
     };
-    let images = |surface: &'_ Surface| {
-        [surface.color.clone(), surface.roughness.clone(), surface.metallic.clone()]
-    };
-    let (own_images, other_images) = (images(own), images(other));
-    let all = || {
-        [share_image].into_iter().chain(own_images.iter().chain(&other_images).map(Option::as_ref))
-    };
+    let [own_images, other_images] = [own, other]
+        .map(|surface| [&surface.color, &surface.roughness, &surface.metallic].map(Option::as_ref));
+    let all = || [share_image].into_iter().chain(own_images).chain(other_images);
     let place = all().flatten().next();
     let alike = |used: &&TextureUse| place.is_some_and(|place| lie_alike(place, used));
     let grid = Texelwise::of(&all().map(|used| used.filter(alike)).collect::<Vec<_>>());
@@ -106,9 +102,7 @@ pub(crate) fn blend_lobes(
         Share::Constant(share) => Factor::Constant(Vec3::splat(*share)),
         Share::Image(image) => factor(Some(image)),
     };
-    let factors =
-        |images: &[Option<TextureUse>; 3]| images.each_ref().map(|used| factor(used.as_ref()));
-    let (own_factors, other_factors) = (factors(&own_images), factors(&other_images));
+    let [own_factors, other_factors] = [own_images, other_images].map(|images| images.map(factor));
     let lobes = |kind: &MaterialKind, factors: &[Factor; 3], index: usize| {
         let [color, rough, metal] = factors.each_ref().map(|factor| factor.at(&grid, index));
         Lobes::of(&kind.scaled(color, luminance(rough), luminance(metal))).unwrap_or_default()
