@@ -157,9 +157,7 @@ impl Reader {
     }
 
     fn measured(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
-        let Some(name) = parameters.string("filename")? else {
-            return Err(parameters.node.error("measured: expected the parameter `filename`"));
-        };
+        let name = parameters.required("filename", parameters.string("filename")?)?;
         let path = parameters.node.file(name)?;
         let table = self.measured.table(&path, &mut self.inputs, &mut self.warnings)?;
         Ok(Model::new(MaterialKind::Measured { path, table }))

@@ -6,6 +6,7 @@ use super::{
     Reader,
     parameters::Parameters,
     spectra::{self, Role},
+    transforms::turned,
 };
 use crate::{
     EnvironmentMap,
@@ -21,11 +22,7 @@ impl Reader {
         let is_old = node.version() < 2.0;
         let matrix = parameters.transform("to_world")?;
         // The zenith is +Z, in version 0.6 +Y.
-        let turned = |direction: DVec3| {
-            let direction = matrix.transform_vector3(direction).try_normalize();
-            direction.ok_or_else(|| node.error("to_world: expected a matrix with an inverse"))
-        };
-        let up = turned(if is_old { DVec3::Y } else { DVec3::Z })?;
+        let up = turned(node, matrix, if is_old { DVec3::Y } else { DVec3::Z })?;
         let sun = match parameters.vector("sun_direction")? {
             Some(direction) => {
                 let direction = direction.as_dvec3();
@@ -36,11 +33,8 @@ impl Reader {
             }
             None => {
                 let [north, east, up] = moment(parameters)?.sun();
-                turned(if is_old {
-                    DVec3::new(east, up, -north)
-                } else {
-                    DVec3::new(-north, -east, up)
-                })?
+                let [old, new] = [DVec3::new(east, up, -north), DVec3::new(-north, -east, up)];
+                turned(node, matrix, if is_old { old } else { new })?
             }
         };
         let positive = (0.0, f32::MAX);

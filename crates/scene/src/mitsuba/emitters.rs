@@ -1,6 +1,6 @@
 //! Lights: lamps, the environment, and the emission of shapes.
 
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::{
     Reader,
@@ -9,6 +9,7 @@ use super::{
     parameters::Parameters,
     spectra::{self, Role},
     textures::Value,
+    transforms::turned,
 };
 use crate::{
     EnvironmentMap, Lamp,
@@ -71,9 +72,7 @@ impl Reader {
 
     fn environment_map(&mut self, parameters: &Parameters<'_>) -> Result<EnvironmentMap> {
         let node = parameters.node;
-        let Some(name) = parameters.string("filename")? else {
-            return Err(node.error("envmap: expected the parameter `filename`"));
-        };
+        let name = parameters.required("filename", parameters.string("filename")?)?;
         let path = node.file(name)?;
         let scale = parameters.float_in("scale", (0.0, f32::MAX))?.unwrap_or(1.0);
         let matrix = parameters.transform("to_world")?;
@@ -97,7 +96,7 @@ impl Reader {
         let factor = texture.map_or(Vec3::ONE, |texture| texture.mean());
         Ok(LampKind::Spot(Spot {
             position: matrix.w_axis.truncate().as_vec3(),
-            direction: along_z(node, matrix)?,
+            direction: turned(node, matrix, DVec3::Z)?.as_vec3(),
             intensity: light(parameters, "intensity")? * factor,
             // A sharp edge is a steep one.
             inner_angle_rad: inner.min(0.999 * outer).to_radians(),
@@ -143,15 +142,7 @@ fn directional(parameters: &Parameters<'_>) -> Result<LampKind> {
         Some(direction) => direction
             .try_normalize()
             .ok_or_else(|| node.error("direction: expected a vector other than 0, found 0 0 0"))?,
-        None => along_z(node, parameters.transform("to_world")?)?,
+        None => turned(node, parameters.transform("to_world")?, DVec3::Z)?.as_vec3(),
     };
     Ok(LampKind::Directional { direction, irradiance: light(parameters, "irradiance")? })
-}
-
-/// Unit direction of the z axis of a placed object.
-fn along_z(node: Node<'_>, matrix: DMat4) -> Result<Vec3> {
-    let direction = matrix.transform_vector3(DVec3::Z).try_normalize();
-    direction
-        .map(|direction| direction.as_vec3())
-        .ok_or_else(|| node.error("to_world: expected a matrix with an inverse"))
 }

@@ -92,6 +92,12 @@ impl<'a> Parameters<'a> {
         node.map_or(Ok(DMat4::IDENTITY), transforms::transform)
     }
 
+    /// Takes the value of a parameter that must be there.
+    pub(super) fn required<T>(&self, name: &str, found: Option<T>) -> Result<T> {
+        let kind = self.node.kind();
+        found.ok_or_else(|| self.node.error(format!("{kind}: expected the parameter `{name}`")))
+    }
+
     /// Objects of a kind (`bsdf`, `emitter`, …), references among them.
     pub(super) fn objects(&self, tag: &str) -> Result<Vec<Node<'a>>> {
         let mut objects = Vec::new();

@@ -1,8 +1,13 @@
 //! Sensors and their film → [`CameraEntry`] and [`FilmSettings`].
 
-use glam::{DMat4, DVec3};
+use glam::DVec3;
 
-use super::{Reader, document::Node, parameters::Parameters};
+use super::{
+    Reader,
+    document::Node,
+    parameters::Parameters,
+    transforms::{NO_INVERSE, turned},
+};
 use crate::{
     Asked, FilmSettings, Filter, MAX_FILM_SIDE, error::Result, features, file::CameraEntry,
 };
@@ -119,12 +124,9 @@ impl Reader {
     fn camera(&mut self, parameters: &Parameters<'_>, film: &Film) -> Result<CameraEntry> {
         let node = parameters.node;
         let matrix = parameters.transform("to_world")?;
-        let axis = |axis: DVec3| matrix.transform_vector3(axis).try_normalize();
-        let (Some(forward), Some(up)) = (axis(DVec3::Z), axis(DVec3::Y)) else {
-            return Err(node.error("to_world: expected a matrix with an inverse"));
-        };
-        if forward.cross(up).length() < 1e-4 || !is_whole(matrix) {
-            return Err(node.error("to_world: expected a matrix with an inverse"));
+        let [forward, up] = [turned(node, matrix, DVec3::Z)?, turned(node, matrix, DVec3::Y)?];
+        if forward.cross(up).length() < 1e-4 || matrix.determinant() == 0.0 {
+            return Err(node.error(NO_INVERSE));
         }
         // The axes of the camera are +X to the left, +Y up, +Z along the view.
         if matrix.determinant() < 0.0 {
@@ -146,10 +148,7 @@ impl Reader {
         let (mut aperture_radius, mut focus_distance) = (0.0, 1.0);
         if node.kind() == "thinlens" {
             let radius = parameters.float_in("aperture_radius", (0.0, f32::MAX))?;
-            let Some(radius) = radius else {
-                return Err(node.error("thinlens: expected the parameter `aperture_radius`"));
-            };
-            aperture_radius = radius;
+            aperture_radius = parameters.required("aperture_radius", radius)?;
             let far = parameters.float("far_clip")?.unwrap_or(1e4);
             let range = (f32::MIN_POSITIVE, f32::MAX);
             focus_distance = parameters.float_in("focus_distance", range)?.unwrap_or(far);
@@ -256,10 +255,6 @@ impl Reader {
         parameters.finish(&mut self.ignored);
         Ok(if is_ours { filter } else { Filter::Gaussian })
     }
-}
-
-fn is_whole(matrix: DMat4) -> bool {
-    matrix.is_finite() && matrix.determinant() != 0.0
 }
 
 /// Tangent of half the angle between the lower and upper edges of the film.

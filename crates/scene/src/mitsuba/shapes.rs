@@ -4,7 +4,10 @@ use std::{borrow::Cow, sync::Arc};
 
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
-use super::{Reader, bsdfs::Model, document::Node, parameters::Parameters, serialized};
+use super::{
+    Reader, bsdfs::Model, document::Node, parameters::Parameters, serialized,
+    transforms::NO_INVERSE,
+};
 use crate::{
     error::Result,
     features, files,
@@ -264,10 +267,7 @@ impl Reader {
 
     fn mesh_file(&mut self, parameters: &Parameters<'_>, shape: &mut Shape) -> Result<()> {
         let node = parameters.node;
-        let Some(name) = parameters.string("filename")? else {
-            let kind = node.kind();
-            return Err(node.error(format!("{kind}: expected the parameter `filename`")));
-        };
+        let name = parameters.required("filename", parameters.string("filename")?)?;
         let path = node.file(name)?;
         let mut is_flat = parameters.boolean("face_normals")?.unwrap_or(false);
         let kind = node.kind();
@@ -347,8 +347,7 @@ impl Reader {
 }
 
 fn placement(node: Node<'_>, matrix: DMat4) -> Result<Transform> {
-    let message = "to_world: expected a matrix with an inverse";
-    Transform::from_matrix(matrix).ok_or_else(|| node.error(message))
+    Transform::from_matrix(matrix).ok_or_else(|| node.error(NO_INVERSE))
 }
 
 /// Axes whose z leads along `axis` with its length, as Mitsuba chooses the others \[Duff et al. 2017\].

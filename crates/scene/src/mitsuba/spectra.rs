@@ -121,10 +121,7 @@ fn of_spectrum(node: Node<'_>, role: Role) -> Result<Vec3> {
     match node.kind() {
         "" => {}
         "blackbody" => {
-            let kelvin = parameters.float("temperature")?;
-            let Some(kelvin) = kelvin else {
-                return Err(node.error("blackbody: expected the parameter `temperature`"));
-            };
+            let kelvin = parameters.required("temperature", parameters.float("temperature")?)?;
             let scale = parameters.float("scale")?.unwrap_or(1.0);
             return Ok(blackbody(node, f64::from(kelvin))? * scale);
         }

@@ -17,9 +17,7 @@ impl Reader {
     /// Reads the strands of a shape into the world; radii are lengths there.
     pub(super) fn strands(&mut self, parameters: &Parameters<'_>, to_world: DMat4) -> Result<Mesh> {
         let node = parameters.node;
-        let Some(name) = parameters.string("filename")? else {
-            return Err(node.error(format!("{}: expected the parameter `filename`", node.kind())));
-        };
+        let name = parameters.required("filename", parameters.string("filename")?)?;
         let path = node.file(name)?;
         let basis = if node.kind() == "bsplinecurve" { Basis::Spline(3) } else { Basis::Linear };
         let radius = match node.kind() {

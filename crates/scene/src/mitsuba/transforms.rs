@@ -8,6 +8,18 @@ use super::{
 };
 use crate::error::Result;
 
+/// Message on a placement that flattens.
+pub(super) const NO_INVERSE: &str = "to_world: expected a matrix with an inverse";
+
+/// Unit direction in the world of a direction of a placed object.
+///
+/// # Errors
+/// [`crate::Error::Parse`] if the matrix leaves nothing of it.
+pub(super) fn turned(node: Node<'_>, matrix: DMat4, direction: DVec3) -> Result<DVec3> {
+    let direction = matrix.transform_vector3(direction).try_normalize();
+    direction.ok_or_else(|| node.error(NO_INVERSE))
+}
+
 /// Matrix of a `transform`.
 ///
 /// # Errors
