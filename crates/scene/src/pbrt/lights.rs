@@ -15,8 +15,9 @@ use crate::{
     features,
     import::equal_area::resample,
     lamp::{LampKind, Spot, SpotFalloff},
+    material::Emission,
     math::colour::luminance,
-    texture::{Encoding, Texture, TextureUse},
+    texture::{Encoding, Texture},
 };
 
 /// Largest side of an equal-area map, texels.
@@ -38,17 +39,6 @@ struct SquareMap {
     source: String,
 }
 
-/// Emission of a shape.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct AreaLight {
-    /// Radiance, or its factor where an image gives it.
-    pub radiance: Vec3,
-    /// Image of the radiance.
-    pub image: Option<TextureUse>,
-    /// True if both sides emit.
-    pub two_sided: bool,
-}
-
 fn color(entity: &Entity, name: &str, textures: &Textures) -> Result<Vec3> {
     match entity.find_of(name, &spectra::KINDS)? {
         Some(parameter) => spectra::light(parameter, textures.folder),
@@ -65,7 +55,7 @@ pub(super) fn area_light(
     area: f64,
     exposure: f32,
     textures: &mut Textures,
-) -> Result<AreaLight> {
+) -> Result<Emission> {
     if entity.name != "diffuse" {
         return Err(entity.error("expected a diffuse light"));
     }
@@ -75,8 +65,8 @@ pub(super) fn area_light(
         let sides = if two_sided { 2.0 } else { 1.0 };
         scale *= power / (sides * area * PI);
     }
-    let image = textures.light_image(entity)?;
-    if let (Some(_), Some(color)) = (&image, entity.find("L")) {
+    let texture = textures.light_image(entity)?;
+    if let (Some(_), Some(color)) = (&texture, entity.find("L")) {
         let message = "expected either `L` or `filename`, found both";
         return Err(color.place.error(format!("{}: {message}", entity.label())));
     }
@@ -87,7 +77,7 @@ pub(super) fn area_light(
             entity.error(format!("expected finite radiance of at least 0, found {radiance}"))
         );
     }
-    Ok(AreaLight { radiance, image, two_sided })
+    Ok(Emission { radiance, texture, two_sided })
 }
 
 impl Lights {

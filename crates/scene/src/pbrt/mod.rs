@@ -48,7 +48,7 @@ use crate::{
 };
 use camera::View;
 use directives::{Description, Reader, Shape};
-use lights::{AreaLight, Lights};
+use lights::Lights;
 use log::Log;
 use materials::{Materials, set_opacity};
 use parameters::Entity;
@@ -235,7 +235,7 @@ impl Builder<'_> {
         Ok(Some((mesh, material)))
     }
 
-    fn material(&mut self, shape: &Shape, light: Option<AreaLight>) -> Result<Option<u32>> {
+    fn material(&mut self, shape: &Shape, light: Option<Emission>) -> Result<Option<u32>> {
         let choice = match &shape.material {
             MaterialChoice::Default => String::new(),
             MaterialChoice::Own(entity) => format!("{:p}", Rc::as_ptr(entity)),
@@ -244,7 +244,7 @@ impl Builder<'_> {
         let alpha = shape.entity.find("alpha");
         let alpha_key = alpha.map_or(String::new(), |alpha| format!("{:?}", alpha.values));
         let light_key = light.as_ref().map(|light| {
-            let image = light.image.as_ref().map_or("", |image| &image.texture.name);
+            let image = light.texture.as_ref().map_or("", |image| &image.texture.name);
             (light.radiance.to_array().map(f32::to_bits), light.two_sided, image.to_owned())
         });
         let key = (choice, alpha_key, shape.interior.clone(), light_key);
@@ -261,13 +261,7 @@ impl Builder<'_> {
                     if let Some(opacity) = opacity {
                         set_opacity(&mut material.surface, opacity);
                     }
-                    material.surface.emission = light
-                        .filter(|light| light.radiance != Vec3::ZERO)
-                        .map(|AreaLight { radiance, image, two_sided }| Emission {
-                            radiance,
-                            texture: image,
-                            two_sided,
-                        });
+                    material.surface.emission = light.filter(|light| light.radiance != Vec3::ZERO);
                     self.kept.materials.push(material);
                     (self.kept.materials.len() - 1) as u32
                 });
