@@ -46,7 +46,7 @@ pub(super) struct Document {
     ids: HashMap<String, usize>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Element {
     tag: String,
     attributes: Vec<(String, String)>,
@@ -156,13 +156,7 @@ impl Document {
             document: Self { folder, version: 3.0, ..Self::default() },
             ..Builder::default()
         };
-        let root = Element {
-            tag: "scene".to_owned(),
-            attributes: Vec::new(),
-            children: Vec::new(),
-            file: 0,
-            line: 1,
-        };
+        let root = Element { tag: "scene".to_owned(), line: 1, ..Element::default() };
         builder.document.elements.push(root);
         builder.file(path, 0, 0)?;
         Ok(builder.document)

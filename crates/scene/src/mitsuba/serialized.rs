@@ -36,8 +36,7 @@ pub(super) fn read(path: &Path, index: usize) -> Result<(Mesh, bool)> {
 
 fn parse(bytes: &[u8], index: usize) -> Result<(Mesh, bool), String> {
     let number = |at: usize, length: usize| -> Option<u64> {
-        let bytes = bytes.get(at..at.checked_add(length)?)?;
-        Some(bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte)))
+        bytes.get(at..at.checked_add(length)?).map(little_endian)
     };
     let header = |at: usize| {
         let (magic, version) = (number(at, 2)?, number(at + 2, 2)?);
@@ -68,6 +67,11 @@ fn parse(bytes: &[u8], index: usize) -> Result<(Mesh, bool), String> {
     Stream::new(mesh).mesh(version)
 }
 
+/// Number of at most eight bytes.
+fn little_endian(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
+}
+
 /// Numbers of a zlib stream, with a bound on what it can hold.
 struct Stream<'a> {
     decoder: ZlibDecoder<&'a [u8]>,
@@ -93,8 +97,7 @@ impl<'a> Stream<'a> {
     }
 
     fn integer(&mut self, length: u64) -> Result<u64, String> {
-        let bytes = self.bytes(length)?;
-        Ok(bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte)))
+        self.bytes(length).map(|bytes| little_endian(&bytes))
     }
 
     /// Vectors of `N` numbers in the precision of the file.
@@ -143,9 +146,7 @@ impl<'a> Stream<'a> {
             mesh.colors = colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect();
         }
         let bytes = self.bytes(triangles * 12)?;
-        let index =
-            |bytes: &[u8]| bytes.iter().rev().fold(0, |index, byte| index << 8 | u32::from(*byte));
-        let mut indices = bytes.chunks_exact(4).map(index);
+        let mut indices = bytes.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes));
         let triangle = |_| std::array::from_fn(|_| indices.next().unwrap_or(u32::MAX));
         mesh.triangles = (0..triangles).map(triangle).collect();
         let largest = mesh.triangles.iter().flatten().max();

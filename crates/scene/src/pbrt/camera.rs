@@ -143,9 +143,7 @@ fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, 
             }
         }
         // No part of the picture.
-        for name in ["filename", "savefp16", "diagonal", "coordinatesystem"] {
-            entity.find(name);
-        }
+        entity.without_effect(&["filename", "savefp16", "diagonal", "coordinatesystem"]);
         log.unused(entity);
     }
     let aspect = f64::from(film.width) / f64::from(film.height);

@@ -104,11 +104,12 @@ impl<'a> Materials<'a> {
             "coatedconductor" => {
                 self.textures.log.ignore(features::PBRT_COATED_CONDUCTOR, &entity.place);
                 self.layers(entity)?;
-                for name in ["interface.roughness", "interface.uroughness", "interface.vroughness"]
-                {
-                    entity.find(name);
-                }
-                entity.find("interface.eta");
+                entity.without_effect(&[
+                    "interface.roughness",
+                    "interface.uroughness",
+                    "interface.vroughness",
+                    "interface.eta",
+                ]);
                 self.conductor(entity, "conductor.", &mut surface)?
             }
             "dielectric" => {
@@ -130,14 +131,12 @@ impl<'a> Materials<'a> {
             }
             "subsurface" => {
                 self.textures.log.ignore(features::PBRT_SUBSURFACE, &entity.place);
-                for name in ["name", "mfp", "sigma_a", "sigma_s", "g", "scale"] {
-                    entity.find(name);
-                }
+                entity.without_effect(&["name", "mfp", "sigma_a", "sigma_s", "g", "scale"]);
                 self.plastic(entity, &mut surface)?
             }
             "hair" => {
                 self.textures.log.ignore(features::PBRT_HAIR, &entity.place);
-                for name in [
+                entity.without_effect(&[
                     "sigma_a",
                     "reflectance",
                     "color",
@@ -147,9 +146,7 @@ impl<'a> Materials<'a> {
                     "beta_m",
                     "beta_n",
                     "alpha",
-                ] {
-                    entity.find(name);
-                }
+                ]);
                 MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) }
             }
             "mix" => return self.mix(entity, name),
@@ -188,9 +185,7 @@ impl<'a> Materials<'a> {
 
     /// Marks the parameters of a coat as read, and reports a coat that absorbs or scatters.
     fn layers(&mut self, entity: &Entity) -> Result<()> {
-        for name in ["thickness", "maxdepth", "nsamples", "g"] {
-            entity.find(name);
-        }
+        entity.without_effect(&["thickness", "maxdepth", "nsamples", "g"]);
         let is_clear = match self.textures.spectrum(entity, "albedo")? {
             Some(Value::Constant(albedo)) => albedo == Vec3::ZERO,
             Some(Value::Image(_)) => false,
@@ -259,9 +254,7 @@ impl<'a> Materials<'a> {
             // pbrt takes η = 1 and the k that reflects as much.
             Some(Value::Constant(color)) => {
                 let color = color.clamp(Vec3::ZERO, Vec3::splat(0.9999));
-                let root = |part: f32| part.sqrt();
-                let k = Vec3::from_array(color.to_array().map(root))
-                    / Vec3::from_array((Vec3::ONE - color).to_array().map(root));
+                let k = color.map(f32::sqrt) / (Vec3::ONE - color).map(f32::sqrt);
                 ConductorFresnel::Exact { eta: Vec3::ONE, k: 2.0 * k }
             }
             None => {

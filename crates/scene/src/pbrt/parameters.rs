@@ -195,13 +195,11 @@ fn push_value(
 ) -> Result<()> {
     let text = source.text();
     let is_pushed = match values {
-        Values::Booleans(values) => match text {
-            "true" | "false" => {
-                values.push(text == "true");
-                true
-            }
-            _ => false,
-        },
+        Values::Booleans(values) => {
+            let truth: Option<bool> = text.parse().ok();
+            values.extend(truth);
+            truth.is_some()
+        }
         Values::Texts(values) if token == Token::Text => {
             values.push(text.to_owned());
             true
@@ -322,6 +320,13 @@ impl Entity {
         match self.numbers(name, Kind::Triple)? {
             [x, y, z, ..] => Ok(DVec3::new(*x, *y, *z)),
             _ => Ok(otherwise),
+        }
+    }
+
+    /// Counts as asked for what changes nothing in the picture, or is named as a whole.
+    pub(super) fn without_effect(&self, names: &[&str]) {
+        for name in names {
+            self.find(name);
         }
     }
 

@@ -175,16 +175,11 @@ impl<R: BufRead> Tokens<R> {
                 };
                 self.advance();
             }
-            self.push(byte)?;
+            if self.buffer.len() == MAX_LENGTH {
+                return Err(self.too_long());
+            }
+            self.buffer.push(byte);
         }
-    }
-
-    fn push(&mut self, byte: u8) -> Result<()> {
-        if self.buffer.len() == MAX_LENGTH {
-            return Err(self.too_long());
-        }
-        self.buffer.push(byte);
-        Ok(())
     }
 
     fn too_long(&self) -> Error {
