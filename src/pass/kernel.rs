@@ -120,8 +120,8 @@ impl Pass {
         &self.kernel
     }
 
-    /// Records the dispatch over `wave`, binding those of `sets` that its shader uses, with the invocations that
-    /// [`Kernel::invocations`] returns.
+    /// Records the dispatch over `wave`, binding those of `sets` that its shader uses, with as many
+    /// invocations as [`Kernel::invocations`] returns.
     pub fn record(
         &self,
         commands: &mut Commands,
