@@ -204,7 +204,7 @@ fn every_vertex_of_a_path_is_unbiased() {
             Settings { roulette: Roulette { vertex: 1, throughput: 1.0 }, ..guided(1) },
         ),
     ];
-    agree(&scene, 4, 12, &modes);
+    agree(&scene, 4, 8, &modes);
 }
 
 #[test]

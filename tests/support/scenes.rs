@@ -2,16 +2,13 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use fenestra::{
-    math::frame::direction_from_lat_long,
-    scene::{
-        Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Lamp, Scene,
-        lamp::LampKind,
-        material::{ConductorFresnel, Emission, Material, MaterialKind},
-        texture::{Texels, Texture, TextureUse},
-    },
+use fenestra::scene::{
+    Camera, EnvironmentMap, FilmSettings, Filter, Geometry, Lamp, Scene,
+    lamp::LampKind,
+    material::{ConductorFresnel, Emission, Material, MaterialKind},
+    texture::{Texels, Texture, TextureUse},
 };
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use super::materials;
 
@@ -133,7 +130,9 @@ pub fn environment(width: u32, radiance: impl Fn(Vec3) -> Vec3) -> EnvironmentMa
     let map = map(width, height, |column, row| {
         let u = (column as f32 + 0.5) / width as f32;
         let v = (row as f32 + 0.5) / height as f32;
-        radiance(direction_from_lat_long(Vec2::new(u, v)))
+        let (azimuth, theta) = ((u - 0.5) * std::f32::consts::TAU, v * std::f32::consts::PI);
+        let sine = theta.sin();
+        radiance(Vec3::new(sine * azimuth.sin(), theta.cos(), -sine * azimuth.cos()))
     });
     EnvironmentMap { rotation_rad: 0.3, ..map }
 }
