@@ -67,6 +67,7 @@ impl Commands {
             .command_buffer_count(1);
         let begin = vk::CommandBufferBeginInfo::default()
             .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        let _changes = labels::lock();
         // SAFETY: the pool was just created and nothing else uses it.
         unsafe {
             commands.raw = raw_device
@@ -262,6 +263,7 @@ impl Commands {
 
 impl Drop for Commands {
     fn drop(&mut self) {
+        let _changes = labels::lock();
         // SAFETY: either never submitted or waited for; destroying null handles is allowed.
         unsafe {
             self.device.raw.destroy_fence(self.fence, None);
