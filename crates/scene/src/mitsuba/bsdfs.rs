@@ -128,12 +128,12 @@ impl Reader {
                 let Width { alpha, texture } = self.width(&parameters)?;
                 self.conductor(&parameters, Some(alpha))?.of_roughness(texture)
             }
-            "dielectric" => self.dielectric(&parameters, 0.0)?,
+            "dielectric" => self.dielectric(&parameters, Some(0.0))?,
             "roughdielectric" | "roughglass" => {
                 let Width { alpha, texture } = self.width(&parameters)?;
-                self.dielectric(&parameters, alpha)?.of_roughness(texture)
+                self.dielectric(&parameters, Some(alpha))?.of_roughness(texture)
             }
-            "thindielectric" => self.thin_dielectric(&parameters)?,
+            "thindielectric" => self.dielectric(&parameters, None)?,
             "principled" => self.principled(&parameters)?,
             "measured" => self.measured(&parameters)?,
             found => {
@@ -376,29 +376,24 @@ impl Reader {
         }))
     }
 
-    /// Factors of reflected and transmitted light.
-    fn glass_colors(&mut self, parameters: &Parameters<'_>) -> Result<[Vec3; 2]> {
+    /// Glass; `alpha` is none for a thin sheet.
+    fn dielectric(&mut self, parameters: &Parameters<'_>, alpha: Option<f32>) -> Result<Model> {
+        let ior = self.ior(parameters, "bk7")?;
         let mut color = |name: &str| {
             let value = self.value(parameters, name, Role::Reflectance)?;
             let feature = features::MI_SPECULAR_TEXTURE;
             let color = self.without_texture(value, parameters.node, feature);
             Ok(color.unwrap_or(Vec3::ONE))
         };
-        Ok([color("specular_reflectance")?, color("specular_transmittance")?])
-    }
-
-    fn dielectric(&mut self, parameters: &Parameters<'_>, alpha: f32) -> Result<Model> {
-        let ior = self.ior(parameters, "bk7")?;
-        let [reflectance, transmittance] = self.glass_colors(parameters)?;
+        let reflectance = color("specular_reflectance")?;
+        let transmittance = color("specular_transmittance")?;
         let absorption = Vec3::ZERO;
-        let kind = MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption };
-        Ok(Model { kind, surface: Surface::default() })
-    }
-
-    fn thin_dielectric(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
-        let ior = self.ior(parameters, "bk7")?;
-        let [reflectance, transmittance] = self.glass_colors(parameters)?;
-        let kind = MaterialKind::ThinDielectric { ior, reflectance, transmittance };
+        let kind = match alpha {
+            Some(alpha) => {
+                MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption }
+            }
+            None => MaterialKind::ThinDielectric { ior, reflectance, transmittance },
+        };
         Ok(Model { kind, surface: Surface::default() })
     }
 }
