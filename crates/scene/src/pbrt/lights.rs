@@ -115,8 +115,13 @@ impl Lights {
                 let irradiance = color(entity, "L", textures)? * factor * exposure;
                 LampKind::Directional { direction: direction(to - from)?, irradiance }
             }
-            "point" => {
-                let factor = scale * power.map_or(1.0, |power| power / (4.0 * PI));
+            "point" | "goniometric" => {
+                // pbrt takes the mean of the channels; a given power replaces it.
+                let mean = match entity.name.as_str() {
+                    "point" => 1.0,
+                    _ => f64::from(mean_of_image(entity, textures)?.0.element_sum() / 3.0),
+                };
+                let factor = scale * power.map_or(mean, |power| power / (4.0 * PI));
                 let intensity = color(entity, "I", textures)? * factor as f32 * exposure;
                 LampKind::Point { position: place(from), intensity }
             }
@@ -135,14 +140,6 @@ impl Lights {
                     outer_angle_rad: outer as f32,
                     falloff: SpotFalloff::SmoothCosine,
                 })
-            }
-            "goniometric" => {
-                let (mean, _) = mean_of_image(entity, textures)?;
-                // pbrt takes the mean of the channels; a given power replaces it.
-                let mean = f64::from(mean.element_sum() / 3.0);
-                let factor = scale * power.map_or(mean, |power| power / (4.0 * PI));
-                let intensity = color(entity, "I", textures)? * factor as f32 * exposure;
-                LampKind::Point { position: place(from), intensity }
             }
             "projection" => {
                 let (mean, aspect) = mean_of_image(entity, textures)?;
