@@ -22,7 +22,6 @@ const MAX_BYTES: u64 = 1 << 33;
 type FileTokens = Tokens<BufReader<Box<dyn Read>>>;
 
 struct Open {
-    path: PathBuf,
     tokens: FileTokens,
     /// True if the graphics state returns to what it was at the end of the file.
     restores: bool,
@@ -35,8 +34,6 @@ pub(super) struct Source {
     stack: Vec<Open>,
     /// Last token, if it is to be read again.
     held: Option<Token>,
-    /// Bytes that may still be read; those of the open files are taken off.
-    bytes_left: u64,
     pub inputs: Vec<PathBuf>,
 }
 
@@ -56,9 +53,9 @@ impl Source {
     /// # Errors
     /// [`Io`](crate::error::Error::Io), and [`Format`](crate::error::Error::Format) for a device.
     pub(super) fn open(path: &Path, folder: Folder) -> Result<Self> {
-        let first = Open { path: path.into(), tokens: open(path, MAX_BYTES)?, restores: false };
+        let first = Open { tokens: open(path, MAX_BYTES)?, restores: false };
         let inputs = vec![path.into()];
-        Ok(Self { folder, stack: vec![first], held: None, bytes_left: MAX_BYTES, inputs })
+        Ok(Self { folder, stack: vec![first], held: None, inputs })
     }
 
     /// Next token, or the end of an imported file or of everything.
@@ -78,9 +75,9 @@ impl Source {
                 return Ok(Part::End);
             }
             let Some(closed) = self.stack.pop() else { return Ok(Part::End) };
-            self.bytes_left = closed.tokens.bytes_left;
+            // All files together have so many bytes.
             if let Some(open) = self.stack.last_mut() {
-                open.tokens.limit(self.bytes_left);
+                open.tokens.bytes_left = closed.tokens.bytes_left;
             }
             if closed.restores {
                 return Ok(Part::EndOfImport);
@@ -124,7 +121,7 @@ impl Source {
     /// scene's folder, one that includes itself, one that cannot be read, and too many files in one another.
     pub(super) fn include(&mut self, name: &str, restores: bool, place: &Place) -> Result<()> {
         let path = self.folder.file(name).map_err(|message| place.error(message))?;
-        if self.stack.iter().any(|open| files::is_same_file(&open.path, &path)) {
+        if self.stack.iter().any(|open| files::is_same_file(&open.tokens.place.path, &path)) {
             return Err(place.error(format!("`{name}` includes itself")));
         }
         if self.stack.len() == MAX_DEPTH {
@@ -134,10 +131,10 @@ impl Source {
         if self.inputs.len() > MAX_INCLUDES {
             return Err(place.error(format!("more than {MAX_INCLUDES} files are included")));
         }
-        let left = self.stack.last().map_or(self.bytes_left, |open| open.tokens.bytes_left);
+        let left = self.stack.last().map_or(MAX_BYTES, |open| open.tokens.bytes_left);
         let tokens = open(&path, left).map_err(|error| place.error(error.to_string()))?;
-        self.inputs.push(path.clone());
-        self.stack.push(Open { path, tokens, restores });
+        self.inputs.push(path);
+        self.stack.push(Open { tokens, restores });
         Ok(())
     }
 }

@@ -66,11 +66,6 @@ impl<R: BufRead> Tokens<R> {
         Self { reader, line: 1, column: 1, bytes_left: most_bytes, buffer, text, place }
     }
 
-    /// Lets no more than so many bytes be read.
-    pub(super) fn limit(&mut self, most_bytes: u64) {
-        self.bytes_left = self.bytes_left.min(most_bytes);
-    }
-
     /// Reads the next token; none at the end of the file.
     ///
     /// # Errors
