@@ -92,7 +92,8 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
         folder: &folder,
         view,
         materials: Materials::new(&description, textures),
-        kept: Kept::default(),
+        made: Vec::new(),
+        made_by_key: HashMap::new(),
         geometry: Geometry::default(),
         dropped: Dropped::default(),
         triangle_count: 0,
@@ -121,12 +122,11 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
         }
     }
     let environment = lights.environment().map_err(|message| Error::scene(path, message))?;
-    let Builder { view, materials, kept, geometry, dropped, triangle_count, .. } = builder;
+    let Builder { view, materials, mut made, geometry, dropped, triangle_count, .. } = builder;
     let Materials { reliefs, textures, .. } = materials;
     let mut log = textures.log;
-    let mut materials = kept.materials;
-    reliefs.settle(&mut materials, &geometry);
-    for material in &mut materials {
+    reliefs.settle(&mut made, &geometry);
+    for material in &mut made {
         if let MaterialKind::Plastic { alpha, .. } | MaterialKind::Conductor { alpha, .. } =
             &mut material.kind
         {
@@ -142,7 +142,7 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
         asked,
         environment: Some(environment),
         lamps: lights.lamps,
-        materials,
+        materials: made,
         geometry,
         variants: Vec::new(),
         inputs: log.inputs,
@@ -175,19 +175,15 @@ fn asked(description: &Description, log: &mut Log) -> Asked {
 /// Tells materials apart: the choice, the alpha of the shape, the medium inside and the light.
 type MaterialKey = (String, String, Option<String>, Option<([u32; 3], bool, String)>);
 
-/// Materials made so far; none for a surface that is not there.
-#[derive(Default)]
-struct Kept {
-    materials: Vec<Material>,
-    by_key: HashMap<MaterialKey, Option<u32>>,
-}
-
 /// Puts shapes in the world.
 struct Builder<'a> {
     folder: &'a Folder,
     view: View,
     materials: Materials<'a>,
-    kept: Kept,
+    /// Materials made so far.
+    made: Vec<Material>,
+    /// Numbers of these; none for a surface that is not there.
+    made_by_key: HashMap<MaterialKey, Option<u32>>,
     geometry: Geometry,
     dropped: Dropped,
     triangle_count: usize,
@@ -220,7 +216,7 @@ impl Builder<'_> {
         let material = self.material(shape, light)?;
         self.materials.textures.log.unused(&shape.entity);
         let Some(material) = material else { return Ok(None) };
-        let surface = &self.kept.materials[material as usize].surface;
+        let surface = &self.made[material as usize].surface;
         if surface.textures().next().is_some() {
             let error = |message: String| shape.entity.error(message);
             shapes::give_coordinates(&mut mesh).map_err(error)?;
@@ -248,7 +244,7 @@ impl Builder<'_> {
             (light.radiance.to_array().map(f32::to_bits), light.two_sided, image.to_owned())
         });
         let key = (choice, alpha_key, shape.interior.clone(), light_key);
-        let kept = match self.kept.by_key.get(&key) {
+        let kept = match self.made_by_key.get(&key) {
             Some(kept) => *kept,
             None => {
                 let mut made = self.materials.make(&shape.material)?;
@@ -262,10 +258,10 @@ impl Builder<'_> {
                         set_opacity(&mut material.surface, opacity);
                     }
                     material.surface.emission = light.filter(|light| light.radiance != Vec3::ZERO);
-                    self.kept.materials.push(material);
-                    (self.kept.materials.len() - 1) as u32
+                    self.made.push(material);
+                    (self.made.len() - 1) as u32
                 });
-                self.kept.by_key.insert(key, kept);
+                self.made_by_key.insert(key, kept);
                 kept
             }
         };
