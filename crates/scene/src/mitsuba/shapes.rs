@@ -29,24 +29,18 @@ pub(super) struct Shape {
     mesh: Mesh,
     to_world: DMat4,
     material: u32,
-    flips: Flips,
+    /// True if triangles turn their other side out, by `flip_normals`.
+    flips: bool,
+    /// True if a transform that mirrors turns them too: Mitsuba computes these normals after it.
+    flips_mirrored: bool,
     /// True for a mesh file, which is as large as it is.
     is_file: bool,
-}
-
-/// Cases in which triangles turn their other side out.
-#[derive(Clone, Copy, Debug)]
-struct Flips {
-    /// By `flip_normals`.
-    always: bool,
-    /// Under a transform that mirrors: Mitsuba computes these normals after the transform.
-    mirrored: bool,
 }
 
 impl Shape {
     /// The mesh as it is under a transform that mirrors or not.
     fn turned(&self, mirrors: bool) -> Cow<'_, Mesh> {
-        let flips = self.flips.always != (self.flips.mirrored && mirrors);
+        let flips = self.flips != (self.flips_mirrored && mirrors);
         let mirrors_tangents = mirrors && !self.mesh.tangents.is_empty();
         if !flips && !mirrors_tangents {
             return Cow::Borrowed(&self.mesh);
@@ -205,12 +199,13 @@ impl Reader {
     fn read_shape(&mut self, node: Node<'_>) -> Result<Shape> {
         let parameters = Parameters::new(node);
         let to_world = parameters.transform("to_world")?;
-        let always = parameters.boolean("flip_normals")?.unwrap_or(false);
+        let flips = parameters.boolean("flip_normals")?.unwrap_or(false);
         let mut shape = Shape {
             mesh: Mesh::default(),
             to_world,
             material: 0,
-            flips: Flips { always, mirrored: false },
+            flips,
+            flips_mirrored: false,
             is_file: false,
         };
         let radius = || Ok(parameters.float_in("radius", (1e-9, 1e9))?.unwrap_or(1.0));
@@ -221,7 +216,7 @@ impl Reader {
                 shape.mesh = quadrics::cube();
                 if parameters.boolean("face_normals")?.unwrap_or(false) {
                     shape.mesh.normals.clear();
-                    shape.flips.mirrored = true;
+                    shape.flips_mirrored = true;
                 }
             }
             "disk" => shape.mesh = quadrics::disk(1.0, 0.0),
@@ -230,7 +225,7 @@ impl Reader {
                 shape.mesh = quadrics::sphere(radius()?);
                 shape.to_world *= DMat4::from_translation(center.as_dvec3());
                 // Mitsuba 3.9.1 turns mirrored spheres inside out, but no other round shape.
-                shape.flips.mirrored = true;
+                shape.flips_mirrored = true;
             }
             "cylinder" => {
                 let point = |name: &str, default: Vec3| {
@@ -297,7 +292,7 @@ impl Reader {
         if is_flat {
             mesh.normals.clear();
         }
-        shape.flips.mirrored = mesh.normals.is_empty();
+        shape.flips_mirrored = mesh.normals.is_empty();
         if mesh.normals.is_empty() && !is_flat {
             mesh.normals = smooth_normals(&mesh);
         }
