@@ -129,8 +129,7 @@ impl<'a> Node<'a> {
     /// # Errors
     /// [`Error::Parse`] for a name that leaves the folder of the scene, or a file that is not there.
     pub(super) fn file(self, name: &str) -> Result<PathBuf> {
-        let document = self.document;
-        document.resolve(name).map_err(|missing| self.error(missing.message()))
+        self.document.resolve(name).flatten().map_err(|message| self.error(message))
     }
 
     /// As [`Node::file`]; none inside for a file that is not there.
@@ -138,11 +137,7 @@ impl<'a> Node<'a> {
     /// # Errors
     /// [`Error::Parse`] for a name that leaves the folder of the scene.
     pub(super) fn file_if_there(self, name: &str) -> Result<Option<PathBuf>> {
-        match self.document.resolve(name) {
-            Ok(path) => Ok(Some(path)),
-            Err(Missing::Absent(_)) => Ok(None),
-            Err(Missing::Forbidden(message)) => Err(self.error(message)),
-        }
+        self.document.resolve(name).map(Result::ok).map_err(|message| self.error(message))
     }
 }
 
@@ -171,29 +166,33 @@ impl Document {
         let nodes = (0..self.elements.len()).map(|index| Node { document: self, index });
         let parameters = nodes.filter(|node| node.tag() == "texture").flat_map(Node::children);
         let names = parameters.filter(|node| node.name() == "filename");
-        names.filter_map(|node| self.resolve(node.attribute("value")?).ok()).collect()
+        names.filter_map(|node| self.resolve(node.attribute("value")?).ok()?.ok()).collect()
     }
 
-    /// Finds a file by its name, in another case if there is none in its own.
-    fn resolve(&self, name: &str) -> Result<PathBuf, Missing> {
+    /// Finds a file by its name, in another case if there is none in its own; inside is a message on one
+    /// that is not there.
+    ///
+    /// # Errors
+    /// A message on a name that no file may have.
+    fn resolve(&self, name: &str) -> Result<Result<PathBuf, String>, String> {
         let own = [PathBuf::new()];
         let folders = own.iter().chain(&self.search);
         let paths = folders.map(|folder| self.folder.file_within(folder, name));
         let (paths, forbidden): (Vec<_>, Vec<_>) = paths.partition(Result::is_ok);
         let paths: Vec<_> = paths.into_iter().flatten().collect();
         if let Some(path) = paths.iter().find(|path| path.exists()) {
-            return Ok(path.clone());
+            return Ok(Ok(path.clone()));
         }
         if let Some(path) = paths.iter().find_map(|path| in_another_case(path)) {
             self.renamed.borrow_mut().insert(name.to_owned());
-            return Ok(path);
+            return Ok(Ok(path));
         }
         if let Some(message) = forbidden.into_iter().find_map(Result::err) {
-            return Err(Missing::Forbidden(message));
+            return Err(message);
         }
         let sought: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
         let sought = sought.join(" or ");
-        Err(Missing::Absent(format!("the file `{name}` is not there; expected {sought}")))
+        Ok(Err(format!("the file `{name}` is not there; expected {sought}")))
     }
 
     /// Warnings on files in another case.
@@ -203,22 +202,6 @@ impl Document {
             renamed.add(features::MI_FILE_CASE, || format!("`{name}`"));
         }
         renamed
-    }
-}
-
-/// Message on a file that cannot be used.
-#[derive(Debug)]
-enum Missing {
-    /// The name is right, but no file has it.
-    Absent(String),
-    /// No file may have the name.
-    Forbidden(String),
-}
-
-impl Missing {
-    fn message(self) -> String {
-        let (Self::Absent(message) | Self::Forbidden(message)) = self;
-        message
     }
 }
 
@@ -354,7 +337,7 @@ impl Builder {
         depth: usize,
         error: &dyn Fn(String) -> Error,
     ) -> Result<()> {
-        let path = self.document.resolve(name).map_err(|missing| error(missing.message()))?;
+        let path = self.document.resolve(name).flatten().map_err(error)?;
         if self.document.files.len() > MAX_INCLUDES {
             return Err(error(format!("more than {MAX_INCLUDES} files are included")));
         }
