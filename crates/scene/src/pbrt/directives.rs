@@ -5,14 +5,16 @@ use std::{collections::HashMap, path::Path, rc::Rc};
 use glam::{DMat4, DVec3};
 
 use super::{
+    log::Log,
     parameters::{Entity, Parameter, read_parameters},
     source::{Part, Source},
     state::{MaterialChoice, Saved, States, look_at},
     tokens::{Place, Token},
 };
 use crate::{
+    beside::Folder,
     error::Result,
-    features::{self, Feature, Ignored},
+    features::{self, Ignored},
 };
 
 /// Shape with the state in force at its directive.
@@ -75,36 +77,34 @@ pub(super) struct Description {
 /// Reader of directives.
 pub(super) struct Reader<'a> {
     source: Source,
-    main: &'a Path,
     states: States,
     in_world: bool,
     /// Object between `ObjectBegin` and `ObjectEnd`.
     object: Option<usize>,
     object_names: HashMap<String, usize>,
     description: Description,
-    ignored: &'a mut Ignored,
+    log: Log<'a>,
 }
 
 impl<'a> Reader<'a> {
-    /// Reads all directives of the main file `main`, to which `source` belongs. Returns the files read
-    /// too.
+    /// Reads all directives of the main file `main`, whose names of files start in `folder`.
     ///
     /// # Errors
     /// [`Parse`](crate::error::Error::Parse) with the place, and errors of the files.
-    pub(super) fn read(
-        main: &'a Path,
-        source: Source,
-        ignored: &'a mut Ignored,
-    ) -> Result<(Description, Source)> {
+    pub(super) fn read(main: &'a Path, folder: Folder) -> Result<(Description, Folder, Log<'a>)> {
         let mut reader = Self {
-            source,
-            main,
+            source: Source::open(main, folder)?,
             states: States::default(),
             in_world: false,
             object: None,
             object_names: HashMap::new(),
             description: Description::default(),
-            ignored,
+            log: Log {
+                main,
+                ignored: Ignored::default(),
+                inputs: Vec::new(),
+                warnings: Vec::new(),
+            },
         };
         loop {
             match reader.source.next()? {
@@ -130,12 +130,8 @@ impl<'a> Reader<'a> {
             let message = "the file ends before WorldBegin: expected a scene of pbrt-v4";
             return Err(reader.source.place().error(message));
         }
-        Ok((reader.description, reader.source))
-    }
-
-    fn ignore(&mut self, feature: Feature, name: &str, place: &Place) {
-        let main = self.main;
-        self.ignored.add_named(feature, name, || place.describe(main));
+        let Source { folder, inputs, .. } = reader.source;
+        Ok((reader.description, folder, Log { inputs, ..reader.log }))
     }
 
     fn directive(&mut self, name: &str, place: Place) -> Result<()> {
@@ -191,7 +187,7 @@ impl<'a> Reader<'a> {
                 if let Some(token) = token.filter(|token| *token == Token::Word) {
                     self.source.hold(token);
                 } else if token.is_some() && !self.source.text().is_empty() {
-                    self.ignore(features::PBRT_MEDIUM, features::PBRT_MEDIUM.name, &place);
+                    self.log.ignore(features::PBRT_MEDIUM, &place);
                 }
                 Ok(())
             }
@@ -289,7 +285,7 @@ impl<'a> Reader<'a> {
             }
             "TransformTimes" => {
                 self.numbers::<2>(name)?;
-                self.ignore(features::PBRT_MOTION, features::PBRT_MOTION.name, place);
+                self.log.ignore(features::PBRT_MOTION, place);
                 ctm
             }
             _ => {
@@ -302,7 +298,7 @@ impl<'a> Reader<'a> {
                     return Err(self.source.place().error(message));
                 }
                 if which != "All" {
-                    self.ignore(features::PBRT_MOTION, features::PBRT_MOTION.name, place);
+                    self.log.ignore(features::PBRT_MOTION, place);
                 }
                 ctm
             }
@@ -351,7 +347,7 @@ impl<'a> Reader<'a> {
             let parameters = read_parameters(&mut self.source)?;
             for parameter in parameters {
                 let name = format!("Option `{}`", parameter.name);
-                self.ignore(features::PBRT_OPTION, &name, &parameter.place);
+                self.log.ignore_named(features::PBRT_OPTION, &name, &parameter.place);
             }
             return Ok(());
         }
@@ -359,7 +355,7 @@ impl<'a> Reader<'a> {
         if name == "ColorSpace" {
             if kind != "srgb" {
                 let name = format!("ColorSpace `{kind}`");
-                self.ignore(features::PBRT_COLOR_SPACE, &name, &place);
+                self.log.ignore_named(features::PBRT_COLOR_SPACE, &name, &place);
             }
             return Ok(());
         }

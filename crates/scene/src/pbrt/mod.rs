@@ -31,8 +31,7 @@ use std::{collections::HashMap, path::Path, rc::Rc};
 use glam::{DMat4, Vec3};
 
 use super::{
-    Asked, Geometry, MIN_ALPHA,
-    features::{self, Ignored},
+    Asked, Geometry, MIN_ALPHA, features,
     geometry::Dropped,
     instance::{Budget, Instance, MAX_INSTANCES},
     mesh::Mesh,
@@ -52,7 +51,6 @@ use lights::Lights;
 use log::Log;
 use materials::{Materials, set_opacity};
 use parameters::Entity;
-use source::Source;
 use state::MaterialChoice;
 use textures::Textures;
 
@@ -74,10 +72,7 @@ pub(crate) fn is_pbrt(path: &Path) -> bool {
 /// [`Error::Parse`] with file, line and column for everything that cannot be read or rendered,
 /// [`Error::Io`] for the main file.
 pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
-    let mut ignored = Ignored::default();
-    let (mut description, source) = Reader::read(path, Source::open(path, folder)?, &mut ignored)?;
-    let folder = source.folder.clone();
-    let mut log = Log { main: path, ignored, inputs: source.inputs, warnings: Vec::new() };
+    let (mut description, folder, mut log) = Reader::read(path, folder)?;
     let asked = asked(&description, &mut log);
     let view = camera::view(&description, path, &mut log)?;
     // A shape's numbers are dropped when its mesh is made.
@@ -89,7 +84,6 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
         lights.add(entity, placed, view.exposure, &mut textures)?;
     }
     let mut builder = Builder {
-        folder: &folder,
         view,
         materials: Materials::new(&description, textures),
         made: Vec::new(),
@@ -177,7 +171,6 @@ type MaterialKey = (String, String, Option<String>, Option<([u32; 3], bool, Stri
 
 /// Puts shapes in the world.
 struct Builder<'a> {
-    folder: &'a Folder,
     view: View,
     materials: Materials<'a>,
     /// Materials made so far.
@@ -194,12 +187,8 @@ struct Builder<'a> {
 impl Builder<'_> {
     /// Makes the mesh of a shape and finds its material; none for a shape without a surface.
     fn prepare(&mut self, shape: &Shape, in_object: bool) -> Result<Option<(Mesh, u32)>> {
-        let mut mesh = shapes::mesh(
-            &shape.entity,
-            self.folder,
-            &mut self.strands,
-            &mut self.materials.textures.log,
-        )?;
+        let Textures { folder, log, .. } = &mut self.materials.textures;
+        let mut mesh = shapes::mesh(&shape.entity, folder, &mut self.strands, log)?;
         let light = match &shape.light {
             Some(entity) if in_object => {
                 self.materials.textures.log.ignore(features::PBRT_INSTANCE_LIGHT, &entity.place);
