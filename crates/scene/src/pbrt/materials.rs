@@ -86,10 +86,7 @@ impl<'a> Materials<'a> {
     }
 
     fn named(&mut self, name: &str, entity: &Entity) -> Result<Option<Material>> {
-        let Some(kind) = entity.string("type")? else {
-            return Err(entity.error("expected a `type`"));
-        };
-        self.of_entity(entity, kind, name.to_owned())
+        self.of_entity(entity, entity.required("type")?, name.to_owned())
     }
 
     fn of_entity(&mut self, entity: &Entity, kind: &str, name: String) -> Result<Option<Material>> {
@@ -174,9 +171,7 @@ impl<'a> Materials<'a> {
     }
 
     fn measured(&mut self, entity: &Entity) -> Result<MaterialKind> {
-        let Some(name) = entity.string("filename")? else {
-            return Err(entity.error("expected a `filename`"));
-        };
+        let name = entity.required("filename")?;
         let Textures { folder, log, .. } = &mut self.textures;
         let path = folder.file(name).map_err(|message| entity.error(message))?;
         let table = self.measured.table(&path, &mut log.inputs, &mut log.warnings)?;

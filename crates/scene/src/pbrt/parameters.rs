@@ -316,6 +316,10 @@ impl Entity {
         Ok(self.find_of(name, &[Kind::Text])?.map(Parameter::text))
     }
 
+    pub(super) fn required(&self, name: &str) -> Result<&str> {
+        self.string(name)?.ok_or_else(|| self.error(format!("expected a `{name}`")))
+    }
+
     pub(super) fn point(&self, name: &str, otherwise: DVec3) -> Result<DVec3> {
         match self.numbers(name, Kind::Triple)? {
             [x, y, z, ..] => Ok(DVec3::new(*x, *y, *z)),

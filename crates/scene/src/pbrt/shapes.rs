@@ -33,9 +33,7 @@ pub(super) fn mesh(
     let mut mesh = match entity.name.as_str() {
         "trianglemesh" => triangle_mesh(entity, log)?,
         "plymesh" => {
-            let Some(file) = entity.string("filename")? else {
-                return Err(entity.error("expected a `filename`"));
-            };
+            let file = entity.required("filename")?;
             let path = folder.file(file).map_err(|message| entity.error(message))?;
             let mut mesh = ply::read(&path).map_err(|error| entity.error(error.to_string()))?;
             // pbrt does not read them.

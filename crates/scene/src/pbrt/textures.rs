@@ -199,9 +199,7 @@ impl<'a> Textures<'a> {
     }
 
     fn image(&mut self, entity: &Entity, is_number: bool) -> Result<Value> {
-        let Some(file) = entity.string("filename")? else {
-            return Err(entity.error("expected a `filename`"));
-        };
+        let file = entity.required("filename")?;
         let (encoding, gamma) = decoding(entity)?;
         let texture = self.load(entity, file, gamma)?;
         let ([du, u], [dv, v]) = mapping(entity, &mut self.log)?;
