@@ -104,6 +104,17 @@ impl Lights {
             let message = "`from` and `to` must differ";
             turned.map(DVec3::as_vec3).ok_or_else(|| entity.error(message))
         };
+        let spot = |axis: DVec3, intensity: Vec3, [inner, outer]: [f64; 2]| -> Result<LampKind> {
+            Ok(LampKind::Spot(Spot {
+                position: place(from),
+                direction: direction(axis)?,
+                intensity,
+                // A falloff needs some width.
+                inner_angle_rad: inner.min(outer * (1.0 - 1e-4)) as f32,
+                outer_angle_rad: outer as f32,
+                falloff: SpotFalloff::SmoothCosine,
+            }))
+        };
         let kind = match entity.name.as_str() {
             "infinite" => {
                 self.infinite(entity, world_from_light, scale, illuminance, exposure, textures)?;
@@ -131,15 +142,8 @@ impl Lights {
                 let [inner, outer] = [inner.clamp(0.0, outer), outer].map(f64::to_radians);
                 let cone = 2.0 * PI * (1.0 - 0.5 * (inner.cos() + outer.cos()));
                 let factor = scale * power.map_or(1.0, |power| power / cone);
-                LampKind::Spot(Spot {
-                    position: place(from),
-                    direction: direction(to - from)?,
-                    intensity: color(entity, "I", textures)? * factor as f32 * exposure,
-                    // A falloff needs some width.
-                    inner_angle_rad: inner.min(outer * (1.0 - 1e-4)) as f32,
-                    outer_angle_rad: outer as f32,
-                    falloff: SpotFalloff::SmoothCosine,
-                })
+                let intensity = color(entity, "I", textures)? * factor as f32 * exposure;
+                spot(to - from, intensity, [inner, outer])?
             }
             "projection" => {
                 let (mean, aspect) = mean_of_image(entity, textures)?;
@@ -154,14 +158,7 @@ impl Lights {
                 let of_power =
                     |power: f64| power / (solid_angle * f64::from(luminance(mean)).max(1e-30));
                 let factor = scale * power.map_or(1.0, of_power);
-                LampKind::Spot(Spot {
-                    position: place(from),
-                    direction: direction(DVec3::Z)?,
-                    intensity: mean * factor as f32 * exposure,
-                    inner_angle_rad: (outer * (1.0 - 1e-4)) as f32,
-                    outer_angle_rad: outer as f32,
-                    falloff: SpotFalloff::SmoothCosine,
-                })
+                spot(DVec3::Z, mean * factor as f32 * exposure, [outer; 2])?
             }
             other => return Err(entity.error(format!("unknown light `{other}`"))),
         };
