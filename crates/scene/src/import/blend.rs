@@ -5,11 +5,13 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use super::Value;
 use crate::{
     MIN_ALPHA,
     coat::normal_reflectance,
+    features::Feature,
     gloss::{DIELECTRIC, metallic_roughness},
-    material::{MaterialKind, Principled, Surface},
+    material::{Material, MaterialKind, Principled, Surface},
     math::colour::luminance,
     texture::{
         Channels, TextureUse,
@@ -17,22 +19,35 @@ use crate::{
     },
 };
 
-/// Share of the second of two materials.
-#[derive(Clone, Debug)]
-pub(crate) enum Share {
-    /// The same everywhere, 0…1.
-    Constant(f32),
-    /// By place, one number.
-    Image(TextureUse),
+/// Mixes two materials, else takes the greater of them; `share`, 0…1, is that of the second. The name is that
+/// of either. Returns what is lost, if something is: `lobes` for one lobe in place of two, `lesser` for a
+/// material that is left out.
+pub(crate) fn mixed(
+    [first, second]: [Material; 2],
+    share: &Value,
+    [lobes, lesser]: [Feature; 2],
+) -> (Material, Option<Feature>) {
+    let pair = [&first, &second].map(|part| (&part.kind, &part.surface));
+    let whole = blend(pair, share).map(|mixture| (mixture, None));
+    let found = whole.or_else(|| Some((blend_lobes(pair, share)?, Some(lobes))));
+    if let Some(((kind, surface), loss)) = found {
+        return (Material { kind, surface, ..first }, loss);
+    }
+    let share = match share {
+        Value::Constant(share) => share.x,
+        Value::Image(_) => 0.5,
+    };
+    let loss = (share > 0.0 && share < 1.0).then_some(lesser);
+    (if share <= 0.5 { first } else { second }, loss)
 }
 
 /// Mixes two materials; none if the mixture is not one of the renderer's materials.
 ///
 /// Two diffuse ones are diffuse with the mixed reflectance, of which at most one of first, second and
 /// share may be an image, or first and second the same one.
-pub(crate) fn blend(
+fn blend(
     [(first, own), (second, other)]: [(&MaterialKind, &Surface); 2],
-    share: &Share,
+    share: &Value,
 ) -> Option<(MaterialKind, Surface)> {
     let (MaterialKind::Diffuse { reflectance: a }, MaterialKind::Diffuse { reflectance: b }) =
         (first, second)
@@ -44,14 +59,14 @@ pub(crate) fn blend(
         return None;
     }
     let (reflectance, color) = match (share, &own.color, &other.color) {
-        (Share::Constant(share), None, None) => (a.lerp(*b, *share), None),
-        (Share::Constant(share), Some(image), None) => {
+        (Value::Constant(share), None, None) => (a.lerp(*b, share.x), None),
+        (Value::Constant(share), Some(image), None) => {
             (Vec3::ONE, Some(image.clone().affine(*a * (1.0 - share), *b * *share)))
         }
-        (Share::Constant(share), None, Some(image)) => {
+        (Value::Constant(share), None, Some(image)) => {
             (Vec3::ONE, Some(image.clone().affine(*b * *share, *a * (1.0 - share))))
         }
-        (Share::Constant(share), Some(one), Some(two)) => {
+        (Value::Constant(share), Some(one), Some(two)) => {
             let (scale, bias) = (Vec3::from(two.scale), Vec3::from(two.bias));
             let same = TextureUse { scale: one.scale, bias: one.bias, ..two.clone() };
             if !Arc::ptr_eq(&one.texture, &two.texture) || same != *one {
@@ -61,8 +76,8 @@ pub(crate) fn blend(
             let scale = Vec3::from(mixed.scale) + *b * *share * scale;
             (Vec3::ONE, Some(TextureUse { scale: scale.to_array(), ..mixed }))
         }
-        (Share::Image(share), None, None) => (Vec3::ONE, Some(numbers(share).affine(*b - *a, *a))),
-        (Share::Image(_), ..) => return None,
+        (Value::Image(share), None, None) => (Vec3::ONE, Some(numbers(share).affine(*b - *a, *a))),
+        (Value::Image(_), ..) => return None,
     };
     let surface = Surface { color, ..rest(own) };
     Some((MaterialKind::Diffuse { reflectance }, surface))
@@ -73,9 +88,9 @@ pub(crate) fn blend(
 ///
 /// The gloss becomes one lobe. Images that lie as the first of them count texel by texel, others by their
 /// means.
-pub(crate) fn blend_lobes(
+fn blend_lobes(
     [(first, own), (second, other)]: [(&MaterialKind, &Surface); 2],
-    share: &Share,
+    share: &Value,
 ) -> Option<(MaterialKind, Surface)> {
     // Materials that have lobes at all have them with any textures.
     Lobes::of(first)?;
@@ -84,8 +99,8 @@ pub(crate) fn blend_lobes(
         return None;
     }
     let share_image = match share {
-        Share::Image(image) => Some(image),
-        Share::Constant(_) => None,
+        Value::Image(image) => Some(image),
+        Value::Constant(_) => None,
     };
     let [own_images, other_images] = [own, other]
         .map(|surface| [&surface.color, &surface.roughness, &surface.metallic].map(Option::as_ref));
@@ -94,21 +109,22 @@ pub(crate) fn blend_lobes(
     let alike = |used: &&TextureUse| place.is_some_and(|place| lie_alike(place, used));
     let grid = Texelwise::of(&all().map(|used| used.filter(alike)).collect::<Vec<_>>());
     let factor = |used: Option<&TextureUse>| match used {
-        None => Factor::Constant(Vec3::ONE),
-        Some(used) if alike(&used) => Factor::Image(used.clone()),
-        Some(used) => Factor::Constant(used.mean().into()),
+        None => Value::Constant(Vec3::ONE),
+        Some(used) if alike(&used) => Value::Image(used.clone()),
+        Some(used) => Value::Constant(used.mean().into()),
     };
-    let share = match share {
-        Share::Constant(share) => Factor::Constant(Vec3::splat(*share)),
-        Share::Image(image) => factor(Some(image)),
+    let share = share_image.map_or(share.clone(), |image| factor(Some(image)));
+    let at = |factor: &Value, index: usize| match factor {
+        Value::Constant(value) => *value,
+        Value::Image(used) => grid.texel(used, index).truncate(),
     };
     let [own_factors, other_factors] = [own_images, other_images].map(|images| images.map(factor));
-    let lobes = |kind: &MaterialKind, factors: &[Factor; 3], index: usize| {
-        let [color, rough, metal] = factors.each_ref().map(|factor| factor.at(&grid, index));
+    let lobes = |kind: &MaterialKind, factors: &[Value; 3], index: usize| {
+        let [color, rough, metal] = factors.each_ref().map(|factor| at(factor, index));
         Lobes::of(&kind.scaled(color, luminance(rough), luminance(metal))).unwrap_or_default()
     };
     let mixture = |index: usize| {
-        let share = luminance(share.at(&grid, index)).clamp(0.0, 1.0);
+        let share = luminance(at(&share, index)).clamp(0.0, 1.0);
         let pair = [lobes(first, &own_factors, index), lobes(second, &other_factors, index)];
         Lobes::mixed(pair, share)
     };
@@ -140,21 +156,6 @@ pub(crate) fn blend_lobes(
 
 /// Refractive index of a dielectric whose reflectance is [`DIELECTRIC`].
 const IOR: f32 = 1.5;
-
-/// Factor of a property by place.
-enum Factor {
-    Constant(Vec3),
-    Image(TextureUse),
-}
-
-impl Factor {
-    fn at(&self, grid: &Texelwise, index: usize) -> Vec3 {
-        match self {
-            Self::Constant(value) => *value,
-            Self::Image(used) => grid.texel(used, index).truncate(),
-        }
-    }
-}
 
 /// Reflection of a material as a diffuse and a specular part.
 #[derive(Clone, Copy, Debug, Default)]
@@ -264,7 +265,7 @@ mod tests {
     }
 
     /// Reflectance of both texels of a mixture.
-    fn mixed(own: Option<TextureUse>, other: Option<TextureUse>, share: &Share) -> [Vec3; 2] {
+    fn both(own: Option<TextureUse>, other: Option<TextureUse>, share: &Value) -> [Vec3; 2] {
         let kinds = [Vec3::new(0.8, 0.4, 0.2), Vec3::new(0.1, 0.3, 0.5)]
             .map(|reflectance| MaterialKind::Diffuse { reflectance });
         let [own, other] = [own, other].map(|color| Surface { color, ..Surface::default() });
@@ -277,18 +278,18 @@ mod tests {
     #[test]
     fn mixtures_are_linear_in_reflectance() {
         let [a, b] = [Vec3::new(0.8, 0.4, 0.2), Vec3::new(0.1, 0.3, 0.5)];
-        let quarter = Share::Constant(0.25);
+        let quarter = Value::number(0.25);
         let texels = [Vec3::X, Vec3::Y];
         for (own, other) in [(false, false), (true, false), (false, true), (true, true)] {
             let used = image();
-            let found = mixed(own.then(|| used.clone()), other.then_some(used), &quarter);
+            let found = both(own.then(|| used.clone()), other.then_some(used), &quarter);
             for (texel, found) in texels.iter().zip(found) {
                 let first = if own { a * texel } else { a };
                 let second = if other { b * texel } else { b };
                 assert!(found.abs_diff_eq(first.lerp(second, 0.25), 1e-3), "{found}");
             }
         }
-        let found = mixed(None, None, &Share::Image(image()));
+        let found = both(None, None, &Value::Image(image()));
         for (texel, found) in texels.iter().zip(found) {
             assert!(found.abs_diff_eq(a.lerp(b, luminance(*texel)), 1e-3), "{found}");
         }
@@ -314,7 +315,7 @@ mod tests {
             assert!(blend_lobes(pair, &quarter).unwrap().1.normal.is_some());
         }
         // By an image, whose texels have the luminances of red and green.
-        let (kind, surface) = blend_lobes(pair, &Share::Image(image())).unwrap();
+        let (kind, surface) = blend_lobes(pair, &Value::Image(image())).unwrap();
         let [color, metal] = [surface.color, surface.metallic].map(|used| used.unwrap().values());
         for (index, texel) in texels.iter().enumerate() {
             let kind = kind.scaled(Vec3::from_slice(&color[index][..3]), 1.0, metal[index][0]);

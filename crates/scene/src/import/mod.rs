@@ -8,13 +8,14 @@ pub(crate) mod relief;
 
 use std::path::PathBuf;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::{
     Asked, EnvironmentMap, FilmSettings, Geometry, Lamp,
     features::{Feature, Ignored},
     file::CameraEntry,
     material::Material,
+    texture::TextureUse,
 };
 
 /// Everything that a file of another format says.
@@ -39,6 +40,32 @@ pub(crate) struct Imported {
     pub inputs: Vec<PathBuf>,
     /// Repairs, and one warning for each kind of thing that is left out.
     pub warnings: Vec<String>,
+}
+
+/// Value over a surface.
+#[derive(Clone, Debug)]
+pub(crate) enum Value {
+    /// The same everywhere; all three are equal for a number.
+    Constant(Vec3),
+    Image(TextureUse),
+}
+
+impl Value {
+    pub(crate) fn number(number: f64) -> Self {
+        Self::Constant(Vec3::splat(number as f32))
+    }
+
+    /// Returns factor · value + shift.
+    pub(crate) fn affine(self, factor: Vec3, shift: Vec3) -> Self {
+        match self {
+            Self::Constant(value) => Self::Constant(value * factor + shift),
+            Self::Image(image) => Self::Image(image.affine(factor, shift)),
+        }
+    }
+
+    pub(crate) fn scaled(self, factor: f32) -> Self {
+        self.affine(Vec3::splat(factor), Vec3::ZERO)
+    }
 }
 
 /// Largest change of a channel that is no loss of colour.

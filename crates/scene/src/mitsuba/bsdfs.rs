@@ -16,7 +16,7 @@ use crate::{
     error::Result,
     features,
     import::media,
-    material::{ConductorFresnel, MaterialKind, Opacity, Surface},
+    material::{ConductorFresnel, Material, MaterialKind, Surface},
     math::colour::luminance,
     texture::TextureUse,
 };
@@ -35,54 +35,41 @@ pub(super) struct Width {
     pub texture: Option<TextureUse>,
 }
 
-/// Reflection of a material with its textures and opacity.
-#[derive(Clone, Debug)]
-pub(super) struct Model {
-    /// Reflection model.
-    pub kind: MaterialKind,
-    /// Textures, opacity, sides.
-    pub surface: Surface,
+/// Material without a name as yet, whose back is black.
+fn one_sided(kind: MaterialKind) -> Material {
+    let surface = Surface { two_sided: false, ..Surface::default() };
+    Material { name: String::new(), kind, surface }
 }
 
-impl Model {
-    fn new(kind: MaterialKind) -> Self {
-        Self { kind, surface: Surface { two_sided: false, ..Surface::default() } }
-    }
+/// Material whose first factor is `value`.
+pub(super) fn colored(value: Value, kind: impl FnOnce(Vec3) -> MaterialKind) -> Material {
+    let is_of_vertices = value.is_of_vertices();
+    let (factor, texture) = value.split();
+    let mut model = one_sided(kind(factor));
+    model.surface.color = texture;
+    model.surface.vertex_color = is_of_vertices;
+    model
+}
 
-    /// Model whose first factor is `value`.
-    pub(super) fn colored(value: Value, kind: impl FnOnce(Vec3) -> MaterialKind) -> Self {
-        let is_of_vertices = value.is_of_vertices();
-        let (factor, texture) = value.split();
-        let mut model = Self::new(kind(factor));
-        model.surface.color = texture;
-        model.surface.vertex_color = is_of_vertices;
-        model
-    }
-
-    /// The same with a factor of the roughness by place.
-    fn of_roughness(mut self, texture: Option<TextureUse>) -> Self {
-        self.surface.roughness = texture;
-        self
-    }
-
-    /// Model of a shape that names none.
-    pub(super) fn default_of_shapes() -> Self {
-        Self::new(MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) })
-    }
+/// Material of a shape that names none.
+pub(super) fn default_of_shapes() -> Material {
+    let kind = MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) };
+    Material { name: "default".to_owned(), ..one_sided(kind) }
 }
 
 impl Reader {
-    pub(super) fn model(&mut self, node: Node<'_>) -> Result<Model> {
+    pub(super) fn model(&mut self, node: Node<'_>) -> Result<Material> {
         if self.models_around == MAX_DEPTH {
             return Err(node.error("a bsdf contains itself, or is nested too deep"));
         }
         self.models_around += 1;
         let model = self.model_of(node);
         self.models_around -= 1;
-        model
+        let name = node.attribute("id").map_or_else(|| node.place(), str::to_owned);
+        Ok(Material { name, ..model? })
     }
 
-    fn model_of(&mut self, node: Node<'_>) -> Result<Model> {
+    fn model_of(&mut self, node: Node<'_>) -> Result<Material> {
         let parameters = Parameters::new(node);
         // Names as `lambertian` and `microfacet` are those of versions up to 0.2.
         let model = match node.kind() {
@@ -93,13 +80,12 @@ impl Reader {
             "coating" | "roughcoating" => self.coating(&parameters)?,
             "bumpmap" | "bump" => self.bump_map(&parameters)?,
             "normalmap" => self.normal_map(&parameters)?,
-            "null" => Model {
-                kind: MaterialKind::Diffuse { reflectance: Vec3::ZERO },
-                surface: Surface {
-                    opacity: Opacity { factor: 0.0, ..Opacity::default() },
-                    ..Surface::default()
-                },
-            },
+            "null" => {
+                let mut model =
+                    Material::new("", MaterialKind::Diffuse { reflectance: Vec3::ZERO });
+                model.surface.opacity.factor = 0.0;
+                model
+            }
             "diffuse" | "lambertian" => {
                 let value = match self.value(&parameters, "reflectance", Role::Reflectance)? {
                     Some(value) => value,
@@ -107,12 +93,12 @@ impl Reader {
                         self.value_or(&parameters, "diffuse_reflectance", Role::Reflectance, 0.5)?
                     }
                 };
-                Model::colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
+                colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
             }
             "difftrans" => {
                 self.ignored.add(features::MI_DIFFUSE_TRANSMISSION, || node.place());
                 let value = self.value_or(&parameters, "transmittance", Role::Reflectance, 0.5)?;
-                Model::colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
+                colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
             }
             "phong" | "ward" => self.phong(&parameters)?,
             "plastic" => self.plastic(&parameters, None)?,
@@ -126,12 +112,16 @@ impl Reader {
             "conductor" | "mirror" => self.conductor(&parameters, None)?,
             "roughconductor" | "roughmetal" => {
                 let Width { alpha, texture } = self.width(&parameters)?;
-                self.conductor(&parameters, Some(alpha))?.of_roughness(texture)
+                let mut model = self.conductor(&parameters, Some(alpha))?;
+                model.surface.roughness = texture;
+                model
             }
             "dielectric" => self.dielectric(&parameters, Some(0.0))?,
             "roughdielectric" | "roughglass" => {
                 let Width { alpha, texture } = self.width(&parameters)?;
-                self.dielectric(&parameters, Some(alpha))?.of_roughness(texture)
+                let mut model = self.dielectric(&parameters, Some(alpha))?;
+                model.surface.roughness = texture;
+                model
             }
             "thindielectric" => self.dielectric(&parameters, None)?,
             "principled" => self.principled(&parameters)?,
@@ -139,14 +129,14 @@ impl Reader {
             found => {
                 let name = format!("reflection model `{found}`, which is diffuse of 0.5");
                 self.ignored.add_named(features::MI_MODEL, &name, || node.place());
-                return Ok(Model::default_of_shapes());
+                return Ok(default_of_shapes());
             }
         };
         parameters.finish(&mut self.ignored);
         Ok(model)
     }
 
-    pub(super) fn inner(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+    pub(super) fn inner(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         match parameters.objects("bsdf")?.first() {
             Some(&inner) => self.model(inner),
             None => {
@@ -156,14 +146,14 @@ impl Reader {
         }
     }
 
-    fn measured(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+    fn measured(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let name = parameters.required("filename", parameters.string("filename")?)?;
         let path = parameters.node.file(name)?;
         let table = self.measured.table(&path, &mut self.inputs, &mut self.warnings)?;
-        Ok(Model::new(MaterialKind::Measured { path, table }))
+        Ok(one_sided(MaterialKind::Measured { path, table }))
     }
 
-    fn two_sided(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+    fn two_sided(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let mut model = self.inner(parameters)?;
         if let Some(second) = parameters.objects("bsdf")?.get(1) {
             self.ignored.add(features::MI_TWO_MODELS, || second.place());
@@ -172,7 +162,7 @@ impl Reader {
         Ok(model)
     }
 
-    fn mask(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+    fn mask(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let mut model = self.inner(parameters)?;
         let opacity = self.value_or(parameters, "opacity", Role::Reflectance, 0.5)?;
         self.cut(&mut model, parameters.node, opacity);
@@ -180,7 +170,7 @@ impl Reader {
     }
 
     /// Multiplies the opacity of a model; of two textures, names the inner one.
-    pub(super) fn cut(&mut self, model: &mut Model, node: Node<'_>, opacity: Value) {
+    pub(super) fn cut(&mut self, model: &mut Material, node: Node<'_>, opacity: Value) {
         let (factor, texture) = opacity.split();
         let own = &mut model.surface.opacity;
         own.factor *= luminance(factor);
@@ -193,20 +183,20 @@ impl Reader {
         }
     }
 
-    fn normal_map(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+    fn normal_map(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let mut model = self.inner(parameters)?;
         if model.surface.normal.is_some() {
             self.ignored.add(features::MI_BUMP_MAP, || parameters.node.place());
         }
         parameters.without_effect(&["flip_invalid_normals", "use_shadowing_function"]);
         match self.value(parameters, "normalmap", Role::Index)? {
-            Some(Value::Texture(texture)) => model.surface.normal = Some(*texture),
+            Some(Value::Texture(texture)) => model.surface.normal = Some(texture),
             _ => return Err(parameters.node.error("normalmap: expected the texture `normalmap`")),
         }
         Ok(model)
     }
 
-    fn bump_map(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+    fn bump_map(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let mut model = self.inner(parameters)?;
         let scale = Vec3::splat(parameters.float("scale")?.unwrap_or(1.0));
         for texture in parameters.objects("texture")? {
@@ -298,7 +288,7 @@ impl Reader {
     }
 
     /// Plastic; `width` is none for a smooth one.
-    fn plastic(&mut self, parameters: &Parameters<'_>, width: Option<Width>) -> Result<Model> {
+    fn plastic(&mut self, parameters: &Parameters<'_>, width: Option<Width>) -> Result<Material> {
         let node = parameters.node;
         let ior = self.ior(parameters, "polypropylene")?;
         let mut value = self.value_or(parameters, "diffuse_reflectance", Role::Reflectance, 0.5)?;
@@ -312,7 +302,7 @@ impl Reader {
             return Err(node.error(message));
         }
         if ior < LEAST_COAT_IOR {
-            return Ok(Model::colored(value, |reflectance| MaterialKind::Diffuse { reflectance }));
+            return Ok(colored(value, |reflectance| MaterialKind::Diffuse { reflectance }));
         }
         if let Some(width) = &width {
             let root = width.texture.as_ref().map_or(1.0, |texture| texture.mean()[0]);
@@ -323,11 +313,13 @@ impl Reader {
         }
         let Width { alpha, texture } = width.unwrap_or(Width { alpha: MIN_ALPHA, texture: None });
         let plastic = |diffuse| MaterialKind::Plastic { diffuse, alpha, ior };
-        Ok(Model::colored(value, plastic).of_roughness(texture))
+        let mut model = colored(value, plastic);
+        model.surface.roughness = texture;
+        Ok(model)
     }
 
     /// Metal; `alpha` is none for a smooth one.
-    fn conductor(&mut self, parameters: &Parameters<'_>, alpha: Option<f32>) -> Result<Model> {
+    fn conductor(&mut self, parameters: &Parameters<'_>, alpha: Option<f32>) -> Result<Material> {
         let node = parameters.node;
         let material = parameters.string("material")?;
         let eta = spectra::parameter(parameters, "eta", Role::Index)?;
@@ -355,7 +347,7 @@ impl Reader {
         let value = self.value_or(parameters, "specular_reflectance", Role::Reflectance, 1.0)?;
         let width = alpha.unwrap_or(MIN_ALPHA);
         let Some((eta, k)) = metal else {
-            return Ok(Model::colored(value, |reflectance| match alpha {
+            return Ok(colored(value, |reflectance| match alpha {
                 None => MaterialKind::Mirror { reflectance },
                 Some(alpha) => MaterialKind::Conductor {
                     alpha,
@@ -367,17 +359,17 @@ impl Reader {
         let (eta, k) = (eta.max(Vec3::splat(0.01)) / outside, k / outside);
         if matches!(value, Value::Color(Vec3::ONE)) {
             let fresnel = ConductorFresnel::Exact { eta, k };
-            return Ok(Model::new(MaterialKind::Conductor { alpha: width, fresnel }));
+            return Ok(one_sided(MaterialKind::Conductor { alpha: width, fresnel }));
         }
         let normal = ((eta - 1.0) * (eta - 1.0) + k * k) / ((eta + 1.0) * (eta + 1.0) + k * k);
-        Ok(Model::colored(value, |factor| MaterialKind::Conductor {
+        Ok(colored(value, |factor| MaterialKind::Conductor {
             alpha: width,
             fresnel: ConductorFresnel::Schlick { reflectance: factor * normal },
         }))
     }
 
     /// Glass; `alpha` is none for a thin sheet.
-    fn dielectric(&mut self, parameters: &Parameters<'_>, alpha: Option<f32>) -> Result<Model> {
+    fn dielectric(&mut self, parameters: &Parameters<'_>, alpha: Option<f32>) -> Result<Material> {
         let ior = self.ior(parameters, "bk7")?;
         let mut color = |name: &str| {
             let value = self.value(parameters, name, Role::Reflectance)?;
@@ -394,6 +386,6 @@ impl Reader {
             }
             None => MaterialKind::ThinDielectric { ior, reflectance, transmittance },
         };
-        Ok(Model { kind, surface: Surface::default() })
+        Ok(Material::new("", kind))
     }
 }

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{
     Reader,
-    bsdfs::{LEAST_COAT_IOR, MAX_COAT_IOR, Model, Width},
+    bsdfs::{LEAST_COAT_IOR, MAX_COAT_IOR, Width, colored},
     document::Node,
     parameters::Parameters,
     spectra::Role,
@@ -16,15 +16,15 @@ use crate::{
     error::Result,
     features,
     gloss::DIELECTRIC,
-    import::blend::{Share, blend, blend_lobes},
-    material::{MaterialKind, Principled},
+    import::{self, blend::mixed},
+    material::{Material, MaterialKind, Principled},
     math::colour::luminance,
 };
 
 impl Reader {
     /// Mixture of two models: an opacity if one of them is `null`, else the greater of them if they do
     /// not mix.
-    pub(super) fn blend(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+    pub(super) fn blend(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let node = parameters.node;
         let [first, second] = parameters.objects("bsdf")?[..] else {
             return Err(node.error("blendbsdf: expected two bsdfs in it"));
@@ -34,9 +34,7 @@ impl Reader {
             let mut model = self.model(first)?;
             let opacity = match weight {
                 Value::Color(weight) | Value::Vertices(weight) => Value::Color(Vec3::ONE - weight),
-                Value::Texture(texture) => {
-                    Value::Texture(Box::new(texture.affine(Vec3::NEG_ONE, Vec3::ONE)))
-                }
+                Value::Texture(texture) => Value::Texture(texture.affine(Vec3::NEG_ONE, Vec3::ONE)),
             };
             self.cut(&mut model, node, opacity);
             return Ok(model);
@@ -46,38 +44,32 @@ impl Reader {
             self.cut(&mut model, node, weight);
             return Ok(model);
         }
-        let [first, second] = [self.model(first)?, self.model(second)?];
-        let share = match weight {
-            Value::Texture(image) => Share::Image(*image),
-            Value::Color(weight) | Value::Vertices(weight) => {
-                Share::Constant(luminance(weight).clamp(0.0, 1.0))
-            }
+        let pair = [self.model(first)?, self.model(second)?];
+        let share = match weight.split() {
+            (_, Some(image)) => import::Value::Image(image),
+            (weight, None) => import::Value::number(luminance(weight).clamp(0.0, 1.0).into()),
         };
-        Ok(self.mixed(node, first, second, &share))
+        Ok(self.mixed(node, pair, &share))
     }
 
     /// Mixture of two models; the greater of them if they do not mix.
-    fn mixed(&mut self, node: Node<'_>, first: Model, second: Model, share: &Share) -> Model {
+    fn mixed(&mut self, node: Node<'_>, pair: [Material; 2], share: &import::Value) -> Material {
+        let [first, second] = pair;
         match share {
-            Share::Constant(0.0) => return first,
-            Share::Constant(1.0) => return second,
+            import::Value::Constant(Vec3::ZERO) => return first,
+            import::Value::Constant(Vec3::ONE) => return second,
             _ => {}
         }
-        let pair = [&first, &second].map(|model| (&model.kind, &model.surface));
-        if let Some((kind, surface)) = blend(pair, share) {
-            return Model { kind, surface };
+        let losses = [features::MI_BLEND_LOBES, features::MI_BLEND];
+        let (material, loss) = mixed([first, second], share, losses);
+        if let Some(loss) = loss {
+            self.ignored.add(loss, || node.place());
         }
-        if let Some((kind, surface)) = blend_lobes(pair, share) {
-            self.ignored.add(features::MI_BLEND_LOBES, || node.place());
-            return Model { kind, surface };
-        }
-        self.ignored.add(features::MI_BLEND, || node.place());
-        let takes_second = matches!(share, Share::Constant(share) if *share > 0.5);
-        if takes_second { second } else { first }
+        material
     }
 
     /// Mixture of models by weights, of version 0.6.
-    pub(super) fn mixture(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+    pub(super) fn mixture(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let node = parameters.node;
         let weights = values::numbers(node, parameters.string("weights")?.unwrap_or_default())?;
         let models = parameters.objects("bsdf")?;
@@ -91,7 +83,7 @@ impl Reader {
             let share = if sum > 0.0 { weight.max(0.0) / sum } else { 0.0 };
             mixed = Some(match mixed {
                 None => model,
-                Some(before) => self.mixed(node, before, model, &Share::Constant(share as f32)),
+                Some(before) => self.mixed(node, [before, model], &import::Value::number(share)),
             });
         }
         if (sum - 1.0).abs() > 1e-3 {
@@ -101,7 +93,7 @@ impl Reader {
     }
 
     /// Coat of version 0.6 on another model: a plastic on a diffuse one.
-    pub(super) fn coating(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+    pub(super) fn coating(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let mut model = self.inner(parameters)?;
         let Width { alpha, texture } = if parameters.node.kind() == "coating" {
             Width { alpha: MIN_ALPHA, texture: None }
@@ -123,7 +115,7 @@ impl Reader {
 
     /// Models of version 0.6 with a diffuse and a glossy lobe of given colours, as a metallic-roughness
     /// material.
-    pub(super) fn phong(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+    pub(super) fn phong(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let node = parameters.node;
         self.ignored.add(features::MI_PHONG, || node.place());
         let alpha = if node.kind() == "ward" {
@@ -144,7 +136,7 @@ impl Reader {
         let (roughness, metallic) = (alpha.clamp(MIN_ALPHA, 1.0).sqrt(), 0.0);
         let specular_color = specular / DIELECTRIC;
         let rest = Principled { metallic, roughness, specular_color, ..Principled::default() };
-        Ok(Model::colored(diffuse, |base_color| {
+        Ok(colored(diffuse, |base_color| {
             MaterialKind::Principled(Principled { base_color, ..rest })
         }))
     }

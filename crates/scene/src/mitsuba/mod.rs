@@ -31,7 +31,7 @@ use std::{
 
 use glam::Vec3;
 
-use self::{bsdfs::Model, document::Document, shapes::Shape};
+use self::{bsdfs::default_of_shapes, document::Document, shapes::Shape};
 use super::{
     Asked, EnvironmentMap, Geometry, Lamp,
     features::{self, Ignored},
@@ -104,8 +104,7 @@ pub(crate) fn read(path: &Path, camera: Option<&str>, folder: Folder) -> Result<
     }
     let (camera, film) = reader.sensor(document.root(), &sensors, camera)?;
     if reader.materials.is_empty() {
-        let Model { kind, surface } = Model::default_of_shapes();
-        reader.materials.push(Material { name: "default".into(), kind, surface });
+        reader.materials.push(default_of_shapes());
     }
     reader.reliefs.settle(&mut reader.materials, &reader.geometry);
     let environment = match reader.environment {

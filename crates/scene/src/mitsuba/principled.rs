@@ -2,13 +2,13 @@
 
 use glam::Vec3;
 
-use super::{Reader, bsdfs::Model, parameters::Parameters, spectra::Role, textures::Value};
+use super::{Reader, bsdfs::colored, parameters::Parameters, spectra::Role, textures::Value};
 use crate::{
     MIN_ALPHA,
     coat::{normal_reflectance, principled_base_factor},
     error::Result,
     features,
-    material::{MaterialKind, Principled, Surface},
+    material::{Material, MaterialKind, Principled},
 };
 
 /// Parameters without a counterpart, which change nothing at 0.
@@ -16,7 +16,7 @@ const WITHOUT_COUNTERPART: [&str; 5] =
     ["anisotropic", "spec_tint", "sheen", "flatness", "clearcoat"];
 
 impl Reader {
-    pub(super) fn principled(&mut self, parameters: &Parameters<'_>) -> Result<Model> {
+    pub(super) fn principled(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let node = parameters.node;
         let mut number =
             |name: &str, default: f32| self.value_or(parameters, name, Role::Index, default);
@@ -71,36 +71,31 @@ impl Reader {
             let absorption = Vec3::ZERO;
             let kind =
                 MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption };
-            let surface = Surface { roughness: texture, ..Surface::default() };
-            return Ok(Model { kind, surface });
+            let mut model = Material::new("", kind);
+            model.surface.roughness = texture;
+            return Ok(model);
         }
         // The base of metal reflects alike in both.
         let diffuse_share = 1.0 - metallic.mean().x.clamp(0.0, 1.0);
         let factor = principled_base_factor(roughness.mean().x, normal_reflectance(ior));
         let factor = 1.0 + diffuse_share * (factor - 1.0);
         let base = base.mapped(|albedo| (factor * albedo).clamp(0.0, 1.0));
-        let vertex_color = base.is_of_vertices();
-        let (base_color, color) = base.split();
         let (metallic, metallic_texture) = metallic.split();
         let (roughness, roughness_texture) = roughness.split();
         // An index of 1 has no reflection at all, which the factor says better.
         let (ior, specular) = if ior < 1.01 { (1.5, 0.0) } else { (ior, 1.0) };
-        let kind = MaterialKind::Principled(Principled {
-            base_color,
-            metallic: metallic.x.clamp(0.0, 1.0),
-            roughness: roughness.x.clamp(0.0, 1.0),
-            ior,
-            specular,
-            ..Principled::default()
+        let mut model = colored(base, |base_color| {
+            MaterialKind::Principled(Principled {
+                base_color,
+                metallic: metallic.x.clamp(0.0, 1.0),
+                roughness: roughness.x.clamp(0.0, 1.0),
+                ior,
+                specular,
+                ..Principled::default()
+            })
         });
-        let surface = Surface {
-            color,
-            vertex_color,
-            metallic: metallic_texture,
-            roughness: roughness_texture,
-            two_sided: false,
-            ..Surface::default()
-        };
-        Ok(Model { kind, surface })
+        model.surface.metallic = metallic_texture;
+        model.surface.roughness = roughness_texture;
+        Ok(model)
     }
 }

@@ -5,7 +5,7 @@ use std::{borrow::Cow, sync::Arc};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use super::{
-    Reader, bsdfs::Model, document::Node, parameters::Parameters, serialized,
+    Reader, bsdfs::default_of_shapes, document::Node, parameters::Parameters, serialized,
     transforms::NO_INVERSE,
 };
 use crate::{
@@ -13,7 +13,6 @@ use crate::{
     features, files,
     geometry::MAX_COORDINATE,
     instance::{Instance, MAX_INSTANCES},
-    material::Material,
     mesh::Mesh,
     quadrics,
     shapes::check_triangles,
@@ -312,32 +311,27 @@ impl Reader {
         if let Some(&material) = self.material_numbers.get(&key) {
             return Ok(material);
         }
-        let read = match model {
+        let mut material = match model {
             Some(node) => self.model(node)?,
-            None => Model::default_of_shapes(),
+            None => default_of_shapes(),
         };
-        let mut name = match model {
-            Some(node) => node.attribute("id").map_or_else(|| node.place(), str::to_owned),
-            None => "default".to_owned(),
-        };
-        let Model { mut kind, mut surface } = read;
         if let Some(light) = light {
-            surface.emission = Some(self.emission(light)?);
-            name = format!("{name}, light of {}", light.place());
+            material.surface.emission = Some(self.emission(light)?);
+            material.name += &format!(", light of {}", light.place());
         }
         if let Some(medium) = interior {
-            self.fill(&mut kind, medium)?;
-            name = format!("{name}, medium of {}", medium.place());
+            self.fill(&mut material.kind, medium)?;
+            material.name += &format!(", medium of {}", medium.place());
         }
         for medium in parameters.objects("medium")? {
             if interior.is_none_or(|inside| inside.index != medium.index) {
                 self.ignored.add(features::MI_MEDIUM, || medium.place());
             }
         }
-        let material = self.materials.len() as u32;
-        self.materials.push(Material { name, kind, surface });
-        self.material_numbers.insert(key, material);
-        Ok(material)
+        let number = self.materials.len() as u32;
+        self.materials.push(material);
+        self.material_numbers.insert(key, number);
+        Ok(number)
     }
 }
 

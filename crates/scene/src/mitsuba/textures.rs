@@ -25,7 +25,7 @@ pub(super) const MAX_SCALES: usize = 8;
 pub(super) enum Value {
     /// The same everywhere.
     Color(Vec3),
-    Texture(Box<TextureUse>),
+    Texture(TextureUse),
     /// Colours of the vertices, times a factor.
     Vertices(Vec3),
 }
@@ -35,7 +35,7 @@ impl Value {
     pub(super) fn split(self) -> (Vec3, Option<TextureUse>) {
         match self {
             Self::Color(color) | Self::Vertices(color) => (color, None),
-            Self::Texture(texture) => (Vec3::ONE, Some(*texture)),
+            Self::Texture(texture) => (Vec3::ONE, Some(texture)),
         }
     }
 
@@ -44,7 +44,7 @@ impl Value {
         match self {
             Self::Color(color) => Self::Color(color.map(of)),
             Self::Vertices(color) => Self::Vertices(color.map(of)),
-            Self::Texture(texture) => Self::Texture(Box::new(texture.mapped(of))),
+            Self::Texture(texture) => Self::Texture(texture.mapped(of)),
         }
     }
 
@@ -96,12 +96,10 @@ impl Reader {
         let parameters = Parameters::new(node);
         let value = match node.kind() {
             "bitmap" | "ldrtexture" => match self.bitmap(&parameters)? {
-                Some(texture) => Value::Texture(Box::new(texture)),
+                Some(texture) => Value::Texture(texture),
                 None => Value::Color(Vec3::splat(0.5)),
             },
-            "checkerboard" => {
-                Value::Texture(Box::new(checkerboard(&parameters, &mut self.ignored)?))
-            }
+            "checkerboard" => Value::Texture(checkerboard(&parameters, &mut self.ignored)?),
             "mesh_attribute" | "vertexcolors" => {
                 let name = parameters.string("name")?.unwrap_or("vertex_color");
                 if name != "vertex_color" {
@@ -132,7 +130,7 @@ impl Reader {
         Ok(match self.texture(inner, scales_left - 1)? {
             Value::Color(color) => Value::Color(color * factor),
             Value::Vertices(color) => Value::Vertices(color * factor),
-            Value::Texture(texture) => Value::Texture(Box::new(texture.affine(factor, Vec3::ZERO))),
+            Value::Texture(texture) => Value::Texture(texture.affine(factor, Vec3::ZERO)),
         })
     }
 

@@ -7,17 +7,13 @@ use super::{
     parameters::{Entity, Kind, Values},
     spectra,
     state::MaterialChoice,
-    textures::{Textures, Value, map_numbers},
+    textures::{Textures, map_numbers},
 };
 use crate::{
     coat::albedo_below_coat,
     error::Result,
     features,
-    import::{
-        blend::{Share, blend, blend_lobes},
-        media,
-        relief::Reliefs,
-    },
+    import::{Value, blend::mixed, media, relief::Reliefs},
     material::{ConductorFresnel, Material, MaterialKind, Surface},
     measured::MeasuredFiles,
     texture::TextureUse,
@@ -346,25 +342,17 @@ impl<'a> Materials<'a> {
             (None, Some(second)) => (second, Some(amount)),
             (Some(first), Some(second)) => {
                 let share = match amount {
-                    Value::Constant(amount) => Share::Constant(amount.x.clamp(0.0, 1.0)),
-                    Value::Image(image) => Share::Image(image),
+                    Value::Constant(amount) => {
+                        Value::Constant(amount.map(|share| share.clamp(0.0, 1.0)))
+                    }
+                    image => image,
                 };
-                let pair = [&first, &second].map(|part| (&part.kind, &part.surface));
-                if let Some((kind, surface)) = blend(pair, &share) {
-                    return Ok(Some(Material { name, kind, surface }));
+                let losses = [features::PBRT_MIX_LOBES, features::PBRT_MIX];
+                let (material, loss) = mixed([first, second], &share, losses);
+                if let Some(loss) = loss {
+                    self.textures.log.ignore(loss, &entity.place);
                 }
-                if let Some((kind, surface)) = blend_lobes(pair, &share) {
-                    self.textures.log.ignore(features::PBRT_MIX_LOBES, &entity.place);
-                    return Ok(Some(Material { name, kind, surface }));
-                }
-                let share = match share {
-                    Share::Constant(share) => share,
-                    Share::Image(_) => 0.5,
-                };
-                if share > 0.0 && share < 1.0 {
-                    self.textures.log.ignore(features::PBRT_MIX, &entity.place);
-                }
-                (if share <= 0.5 { first } else { second }, None)
+                (material, None)
             }
         };
         let mut material = Material { name, ..material };

@@ -16,38 +16,13 @@ use crate::{
     beside::Folder,
     error::Result,
     features,
+    import::Value,
     mesh::images::has_alpha,
     texture::{Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
 };
 
 /// Most textures that may refer to one another.
 const MAX_DEPTH: usize = 16;
-
-/// Value of a parameter over a surface.
-#[derive(Clone, Debug)]
-pub(super) enum Value {
-    /// The same everywhere; all three are equal for a number.
-    Constant(Vec3),
-    Image(TextureUse),
-}
-
-impl Value {
-    pub(super) fn number(number: f64) -> Self {
-        Self::Constant(Vec3::splat(number as f32))
-    }
-
-    /// Returns factor · value + shift.
-    pub(super) fn affine(self, factor: Vec3, shift: Vec3) -> Self {
-        match self {
-            Self::Constant(value) => Self::Constant(value * factor + shift),
-            Self::Image(image) => Self::Image(image.affine(factor, shift)),
-        }
-    }
-
-    pub(super) fn scaled(self, factor: f32) -> Self {
-        self.affine(Vec3::splat(factor), Vec3::ZERO)
-    }
-}
 
 /// Textures of a scene, with the images read so far.
 pub(super) struct Textures<'a> {
