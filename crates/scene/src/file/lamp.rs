@@ -1,18 +1,21 @@
 //! `[[lamp]]`.
 
 use serde::Deserialize;
+use toml::Spanned;
 
+use super::Entry;
 use crate::lamp::SpotFalloff;
 
-#[derive(Clone, Debug)]
-pub(crate) struct LampEntry {
-    /// Line of the entry, from 1.
-    pub line: usize,
+pub(crate) type LampEntry = Entry<LampKeys, LampKindEntry>;
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct LampKeys {
     /// Name, for messages.
     pub name: Option<String>,
-    /// Kind and its numbers.
-    pub kind: LampKindEntry,
-    /// Group of its light.
+    /// Kind.
+    pub r#type: Spanned<String>,
+    /// Group of its light, for `--aov LightGroups`. Default: lamps.
     pub light_group: Option<String>,
 }
 

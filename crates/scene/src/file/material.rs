@@ -5,16 +5,12 @@ use std::path::PathBuf;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::value::{TextureEntry, Textured};
+use super::{
+    Entry,
+    value::{TextureEntry, Textured},
+};
 
-#[derive(Clone, Debug)]
-pub(crate) struct MaterialEntry {
-    /// Line of the entry, from 1.
-    pub line: usize,
-    /// Keys of all types.
-    pub keys: MaterialKeys,
-    pub kind: MaterialKindEntry,
-}
+pub(crate) type MaterialEntry = Entry<MaterialKeys, MaterialKindEntry>;
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -16,7 +16,7 @@ use std::{
 use serde::Deserialize;
 use toml::Spanned;
 
-pub(crate) use lamp::{LampEntry, LampKindEntry};
+pub(crate) use lamp::{LampEntry, LampKeys, LampKindEntry};
 pub(crate) use material::{ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry};
 pub(crate) use portal::PortalKeys;
 pub(crate) use value::{ChannelEntry, NumberOrVector, TextureEntry, Textured};
@@ -28,17 +28,26 @@ use super::{
 };
 use crate::error::Result;
 
-#[derive(Debug)]
+/// The tables that have no kinds, and entries of arrays of tables, which are read one by one.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct SceneFile {
     pub camera: CameraEntry,
-    pub keyframes: Vec<KeyframeEntry>,
+    #[serde(default)]
     pub film: FilmSettings,
     /// `[environment]`; black without.
     pub environment: Option<EnvironmentEntry>,
+    #[serde(skip)]
+    pub keyframes: Vec<Entry<KeyframeEntry>>,
+    #[serde(skip)]
     pub lamps: Vec<LampEntry>,
+    #[serde(skip)]
     pub portals: Vec<Entry<PortalKeys>>,
+    #[serde(skip)]
     pub materials: Vec<MaterialEntry>,
+    #[serde(skip)]
     pub objects: Vec<ObjectEntry>,
+    #[serde(skip)]
     pub includes: Vec<Entry<IncludeKeys>>,
 }
 
@@ -112,22 +121,17 @@ fn default_environment_scale() -> f32 {
 }
 
 /// Entry of an array of tables.
-#[derive(Debug)]
-pub(crate) struct Entry<T> {
+#[derive(Clone, Debug)]
+pub(crate) struct Entry<K, V = ()> {
     /// Line of the entry, from 1.
     pub line: usize,
-    pub keys: T,
+    /// Keys of all kinds.
+    pub keys: K,
+    /// Kind with its own keys.
+    pub kind: V,
 }
 
-#[derive(Debug)]
-pub(crate) struct ObjectEntry {
-    /// Line of the entry, from 1.
-    pub line: usize,
-    /// Keys of every object, without `mesh` and `shape`.
-    pub keys: ObjectKeys,
-    /// Source of its triangles.
-    pub source: ObjectSource,
-}
+pub(crate) type ObjectEntry = Entry<ObjectKeys, ObjectSource>;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use serde::{
-    Deserialize, Deserializer,
+    Deserializer,
     de::{DeserializeOwned, Error as _, Visitor, value},
     forward_to_deserialize_any,
 };
@@ -16,35 +16,13 @@ use toml::{
 };
 
 use super::{
-    CameraEntry, Entry, EnvironmentEntry, LampEntry, LampKindEntry, MaterialEntry, MaterialKeys,
-    MaterialKindEntry, ObjectEntry, ObjectKeys, ObjectSource, SceneFile,
+    Entry, LampKeys, LampKindEntry, MaterialKeys, MaterialKindEntry, ObjectKeys, ObjectSource,
+    SceneFile,
 };
 use crate::{
-    FilmSettings,
     error::{Result, TextError, line_and_column},
     shapes::{self, Shape},
 };
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct LampKeys {
-    /// Name, for messages.
-    name: Option<String>,
-    /// Kind.
-    r#type: Spanned<String>,
-    /// Group of its light, for `--aov LightGroups`. Default: lamps.
-    light_group: Option<String>,
-}
-
-/// Tables that have no kinds.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RootKeys {
-    camera: CameraEntry,
-    #[serde(default)]
-    film: FilmSettings,
-    environment: Option<EnvironmentEntry>,
-}
 
 pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
     let root = DeTable::parse(text)?;
@@ -53,38 +31,35 @@ pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
     let known =
         ["camera", "film", "environment", "lamp", "portal", "material", "object", "include"];
     refuse_unknown_keys(&table, &known, "the scene")?;
-    let lamps = take_array(&mut table, "lamp")?;
-    let portals = take_array(&mut table, "portal")?;
-    let materials = take_array(&mut table, "material")?;
-    let objects = take_array(&mut table, "object")?;
-    let includes = take_array(&mut table, "include")?;
+    let mut array = |key| take_array(&mut table, key);
+    let (lamps, portals, materials) = (array("lamp")?, array("portal")?, array("material")?);
+    let (objects, includes) = (array("object")?, array("include")?);
     let keyframes = match table.get_mut("camera").map(Spanned::get_mut) {
         Some(DeValue::Table(camera)) => take_array(camera, "keyframe")?,
         _ => Vec::new(),
     };
-    let root_keys: RootKeys = read_table(table, span)?;
-    Ok(SceneFile {
-        camera: root_keys.camera,
-        keyframes: read_all(keyframes, text, |entry, text| {
-            Ok(read_plain(entry, text, "[[camera.keyframe]]")?.keys)
-        })?,
-        film: root_keys.film,
-        environment: root_keys.environment,
-        lamps: read_all(lamps, text, read_lamp)?,
-        portals: read_all(portals, text, |e, text| read_plain(e, text, "[[portal]]"))?,
-        materials: read_all(materials, text, read_material)?,
-        objects: read_all(objects, text, read_object)?,
-        includes: read_all(includes, text, |e, text| read_plain(e, text, "[[include]]"))?,
-    })
+    let mut file: SceneFile = read_table(table, span)?;
+    file.keyframes = read_all(keyframes, text, |e| read_plain(e, "[[camera.keyframe]]"))?;
+    file.lamps = read_all(lamps, text, read_lamp)?;
+    file.portals = read_all(portals, text, |e| read_plain(e, "[[portal]]"))?;
+    file.materials = read_all(materials, text, read_material)?;
+    file.objects = read_all(objects, text, read_object)?;
+    file.includes = read_all(includes, text, |e| read_plain(e, "[[include]]"))?;
+    Ok(file)
 }
 
 /// Reads every entry of an array of tables.
-fn read_all<T>(
+fn read_all<K, V>(
     entries: Vec<Spanned<DeValue>>,
     text: &str,
-    read: fn(Spanned<DeValue>, &str) -> Result<T, TextError>,
-) -> Result<Vec<T>, TextError> {
-    entries.into_iter().map(|entry| read(entry, text)).collect()
+    read: fn(Spanned<DeValue>) -> Result<(K, V), TextError>,
+) -> Result<Vec<Entry<K, V>>, TextError> {
+    let read = |entry: Spanned<DeValue>| {
+        let line = line_and_column(text, entry.span().start).0;
+        let (keys, kind) = read(entry)?;
+        Ok(Entry { line, keys, kind })
+    };
+    entries.into_iter().map(read).collect()
 }
 
 /// Removes the array of tables `key` from `table`; empty if there is none.
@@ -100,41 +75,45 @@ fn take_array<'i>(
     }
 }
 
-fn read_material(entry: Spanned<DeValue>, text: &str) -> Result<MaterialEntry, TextError> {
-    let line = line_and_column(text, entry.span().start).0;
+fn read_material(entry: Spanned<DeValue>) -> Result<(MaterialKeys, MaterialKindEntry), TextError> {
     let (keys, rest): (MaterialKeys, _) = KindTable::split(entry, "[[material]]")?;
     let type_name = keys.r#type.get_ref();
     let owner = format!("material `{}` of type `{type_name}`", keys.name);
     let kind = rest.read_kind("material type", &keys.r#type, MATERIALS, &owner)?;
-    Ok(MaterialEntry { line, keys, kind })
+    Ok((keys, kind))
 }
 
-fn read_lamp(entry: Spanned<DeValue>, text: &str) -> Result<LampEntry, TextError> {
-    let line = line_and_column(text, entry.span().start).0;
+fn read_lamp(entry: Spanned<DeValue>) -> Result<(LampKeys, LampKindEntry), TextError> {
     let (keys, rest): (LampKeys, _) = KindTable::split(entry, "[[lamp]]")?;
     let type_name = keys.r#type.get_ref();
     let label = keys.name.as_ref().map_or("lamp".to_owned(), |name| format!("lamp `{name}`"));
     let owner = format!("{label} of type `{type_name}`");
     let kind = rest.read_kind("lamp type", &keys.r#type, LAMPS, &owner)?;
-    Ok(LampEntry { line, name: keys.name, kind, light_group: keys.light_group })
+    Ok((keys, kind))
 }
 
 /// Reads an entry of an array of tables that has no kinds; `header` names it.
 fn read_plain<T: DeserializeOwned>(
     entry: Spanned<DeValue>,
-    text: &str,
     header: &str,
-) -> Result<Entry<T>, TextError> {
-    let span = entry.span();
-    let line = line_and_column(text, span.start).0;
-    let DeValue::Table(table) = entry.into_inner() else {
-        return Err(TextError { span, message: format!("expected a table, `{header}`") });
-    };
-    Ok(Entry { line, keys: read_table(table, span)? })
+) -> Result<(T, ()), TextError> {
+    let (table, span) = table_of(entry, header)?;
+    Ok((read_table(table, span)?, ()))
 }
 
-fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextError> {
-    let line = line_and_column(text, entry.span().start).0;
+/// Table of an entry, and its place; `header` names it in the message if it is not one.
+fn table_of<'i>(
+    entry: Spanned<DeValue<'i>>,
+    header: &str,
+) -> Result<(DeTable<'i>, Range<usize>), TextError> {
+    let span = entry.span();
+    match entry.into_inner() {
+        DeValue::Table(table) => Ok((table, span)),
+        _ => Err(TextError { span, message: format!("expected a table, `{header}`") }),
+    }
+}
+
+fn read_object(entry: Spanned<DeValue>) -> Result<(ObjectKeys, ObjectSource), TextError> {
     let (mut keys, rest): (ObjectKeys, _) = KindTable::split(entry, "[[object]]")?;
     let label = keys.name.as_ref().map_or("object".to_owned(), |name| format!("object `{name}`"));
     let source = match (keys.mesh.take(), keys.shape.take()) {
@@ -155,7 +134,7 @@ fn read_object(entry: Spanned<DeValue>, text: &str) -> Result<ObjectEntry, TextE
             });
         }
     };
-    Ok(ObjectEntry { line, keys, source })
+    Ok((keys, source))
 }
 
 /// Readers of the kinds of an entry, by name.
@@ -212,10 +191,7 @@ impl KindTable<'_> {
         entry: Spanned<DeValue<'i>>,
         header: &str,
     ) -> Result<(T, KindTable<'i>), TextError> {
-        let span = entry.span();
-        let DeValue::Table(all) = entry.into_inner() else {
-            return Err(TextError { span, message: format!("expected a table, `{header}`") });
-        };
+        let (all, span) = table_of(entry, header)?;
         let shared_keys = struct_fields::<T>();
         let (mut shared, mut table) = (DeTable::new(), DeTable::new());
         for (key, value) in all {

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::Loader;
 use crate::{
     error::{Error, Result},
-    file::{CameraEntry, KeyframeEntry, SceneFile},
+    file::{CameraEntry, Entry, KeyframeEntry, SceneFile},
     math::keys::{between, monotone},
 };
 
@@ -15,7 +15,7 @@ impl Loader<'_> {
     /// frames, the camera of `[camera]`.
     pub(super) fn camera_at(&self, file: &SceneFile, time: Option<f32>) -> Result<CameraEntry> {
         let mut keys = Vec::new();
-        for frame in &file.keyframes {
+        for Entry { keys: frame, .. } in &file.keyframes {
             let camera = completed(frame, &file.camera);
             let at = |error: Error| match error {
                 Error::Scene { message, .. } => {
@@ -26,7 +26,7 @@ impl Loader<'_> {
             self.camera(&camera).map_err(at)?;
             keys.push(camera);
         }
-        let times: Vec<f32> = file.keyframes.iter().map(|frame| frame.time).collect();
+        let times: Vec<f32> = file.keyframes.iter().map(|frame| frame.keys.time).collect();
         let ascend = times.iter().all(|time| time.is_finite()) && times.is_sorted_by(|a, b| a < b);
         self.check(ascend, || {
             format!("camera.keyframe: expected times that ascend, found {times:?}")

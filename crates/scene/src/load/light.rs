@@ -101,7 +101,8 @@ impl Loader<'_> {
     }
 
     fn lamp(&self, index: usize, entry: &LampEntry) -> Result<Lamp> {
-        let label = match &entry.name {
+        let keys = &entry.keys;
+        let label = match &keys.name {
             Some(name) => format!("lamp `{name}` (line {})", entry.line),
             None => format!("lamp {index} (line {})", entry.line),
         };
@@ -146,9 +147,9 @@ impl Loader<'_> {
                 irradiance: power("irradiance", entry.irradiance)?,
             },
         };
-        self.check_light_group(&label, entry.light_group.as_deref())?;
-        let name = entry.name.clone().unwrap_or_default();
-        Ok(Lamp { name, kind, light_group: entry.light_group.clone() })
+        self.check_light_group(&label, keys.light_group.as_deref())?;
+        let name = keys.name.clone().unwrap_or_default();
+        Ok(Lamp { name, kind, light_group: keys.light_group.clone() })
     }
 
     /// Checks that a group can name a layer of an image.

@@ -70,7 +70,7 @@ impl Loader<'_> {
         let mut shape_triangles = 0;
         for (object, label, key) in &objects {
             if !meshes.contains_key(key) {
-                let mesh = match &object.source {
+                let mesh = match &object.kind {
                     ObjectSource::Mesh(name) if self.arrays.meshes.contains_key(name) => {
                         let mut mesh = self.arrays.meshes[name].clone();
                         mesh.check()
@@ -134,7 +134,7 @@ impl Loader<'_> {
             let count = mesh.triangles.len();
             vertices += mesh.positions.len();
             triangles += count;
-            if let ObjectSource::Shape { .. } = object.source {
+            if let ObjectSource::Shape { .. } = object.kind {
                 shape_triangles += count;
                 self.check_shapes(label, shape_triangles)?;
             }
@@ -171,7 +171,7 @@ impl Loader<'_> {
 
     /// Key that tells meshes apart: the path of a mesh file or the parameters of a shape.
     fn mesh_key(&self, object: &ObjectEntry) -> PathBuf {
-        match &object.source {
+        match &object.kind {
             ObjectSource::Mesh(mesh) => self.folder.join(mesh),
             ObjectSource::Shape { shape, .. } => PathBuf::from(format!("{shape:?}")),
         }
@@ -218,7 +218,7 @@ impl Loader<'_> {
     ) -> Result<()> {
         match &object.keys.material {
             Some(name) => self.material_index(label, name, materials).map(drop),
-            None => self.check(matches!(object.source, ObjectSource::Mesh(_)), || {
+            None => self.check(matches!(object.kind, ObjectSource::Mesh(_)), || {
                 format!("{label}: expected a material, found none")
             }),
         }
@@ -396,7 +396,7 @@ fn named_material<'a>(object: &ObjectEntry, materials: &'a [Material]) -> Option
 
 /// Label of an object in messages: name or number, source and line.
 fn object_label(index: usize, object: &ObjectEntry) -> String {
-    let source = match &object.source {
+    let source = match &object.kind {
         ObjectSource::Mesh(mesh) => mesh.display().to_string(),
         ObjectSource::Shape { name, .. } => name.clone(),
     };
