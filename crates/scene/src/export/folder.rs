@@ -62,8 +62,13 @@ pub(super) fn identifier(index: usize, name: &str) -> String {
     format!("m{index:02}_{}", safe_name(name))
 }
 
+/// As [`safe_name`], of a file without its extension.
+pub(super) fn safe_stem(path: impl AsRef<Path>) -> String {
+    safe_name(&path.as_ref().file_stem().unwrap_or_default().to_string_lossy())
+}
+
 /// Name of letters and digits, other characters as `_`.
-pub(super) fn safe_name(name: &str) -> String {
+fn safe_name(name: &str) -> String {
     let safe = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     name.chars().take(60).map(safe).collect()
 }

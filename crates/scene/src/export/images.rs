@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use rayon::prelude::*;
 
-use super::folder::safe_name;
+use super::{folder::safe_stem, number_of};
 use crate::{
     coat::base_below_coat,
     error::Result,
@@ -81,25 +81,16 @@ impl Pictures {
             },
             recipe,
         };
-        let same = |other: &Picture| {
-            Arc::ptr_eq(&other.used.texture, &picture.used.texture)
-                && TextureUse { texture: Arc::clone(&picture.used.texture), ..other.used.clone() }
-                    == picture.used
-                && other.recipe == recipe
+        let is_same = |one: &Picture, other: &Picture| {
+            Arc::ptr_eq(&one.used.texture, &other.used.texture) && one == other
         };
-        let index = self.list.iter().position(same).unwrap_or_else(|| {
-            self.list.push(picture);
-            self.list.len() - 1
-        });
+        let index = number_of(&mut self.list, picture, is_same);
         self.list[index].bitmap(index)
     }
 
     /// Adds a file that goes unchanged; returns its name in the folder of the scene.
     pub(super) fn copy(&mut self, path: &Path) -> String {
-        let index = self.copies.iter().position(|other| other == path).unwrap_or_else(|| {
-            self.copies.push(path.to_owned());
-            self.copies.len() - 1
-        });
+        let index = number_of(&mut self.copies, path.to_owned(), PathBuf::eq);
         copied_name(index, path)
     }
 
@@ -128,15 +119,13 @@ impl Pictures {
 
 /// Name of a copied file, an RGL measurement.
 fn copied_name(index: usize, path: &Path) -> String {
-    let stem = safe_name(&path.file_stem().unwrap_or_default().to_string_lossy());
-    format!("f{index:02}_{stem}.bsdf")
+    format!("f{index:02}_{}.bsdf", safe_stem(path))
 }
 
 impl Picture {
     fn bitmap(&self, index: usize) -> Bitmap {
         let extension = if self.is_stored() { "png" } else { "exr" };
-        let stem = Path::new(&self.used.texture.name).file_stem().unwrap_or_default();
-        let stem = safe_name(&stem.to_string_lossy());
+        let stem = safe_stem(&self.used.texture.name);
         let is_linear = self.used.encoding == Encoding::Linear
             || self.used.channels == Channels::Alpha
             || !self.is_stored();

@@ -97,6 +97,14 @@ fn has_media(scene: &Scene) -> bool {
     scene.materials.iter().any(|material| material.kind.absorption().is_some())
 }
 
+/// Number of a value in a list, to which it is added unless one `is_same`.
+fn number_of<T>(list: &mut Vec<T>, value: T, is_same: impl Fn(&T, &T) -> bool) -> usize {
+    list.iter().position(|other| is_same(other, &value)).unwrap_or_else(|| {
+        list.push(value);
+        list.len() - 1
+    })
+}
+
 /// Three numbers with commas.
 fn triple(vector: Vec3) -> String {
     format!("{}, {}, {}", vector.x, vector.y, vector.z)

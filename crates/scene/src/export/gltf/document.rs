@@ -7,7 +7,10 @@ use serde_json::{Map, Value, json};
 use super::images::Sheet;
 use crate::{
     error::Result,
-    export::parts::{Part, Vertex},
+    export::{
+        number_of,
+        parts::{Part, Vertex},
+    },
     texture::{Interpolation, TextureUse, Wrap},
 };
 
@@ -33,11 +36,7 @@ impl Textures {
     /// Adds an image that is looked up as `used`, or finds the same again. Returns the object that
     /// refers to it, and false if its transformation is not one of glTF.
     pub(super) fn add(&mut self, sheet: Sheet, used: &TextureUse) -> (Map<String, Value>, bool) {
-        let source = self.sheets.iter().position(|other| other.is_same(&sheet));
-        let source = source.unwrap_or_else(|| {
-            self.sheets.push(sheet);
-            self.sheets.len() - 1
-        });
+        let source = number_of(&mut self.sheets, sheet, Sheet::is_same);
         let wrap = used.wrap.map(|wrap| match wrap {
             Wrap::Repeat => 10497,
             Wrap::Mirror => 33648,
@@ -46,8 +45,9 @@ impl Textures {
         let filter = if used.interpolation == Interpolation::Nearest { NEAREST } else { LINEAR };
         let sampler =
             json!({"wrapS": wrap[0], "wrapT": wrap[1], "magFilter": filter, "minFilter": filter});
-        let sampler = number_of(&mut self.samplers, sampler);
-        let index = number_of(&mut self.textures, json!({"source": source, "sampler": sampler}));
+        let sampler = number_of(&mut self.samplers, sampler, Value::eq);
+        let texture = json!({"source": source, "sampler": sampler});
+        let index = number_of(&mut self.textures, texture, Value::eq);
         let mut info = Map::new();
         info.insert("index".to_owned(), index.into());
         if used.uv_set != 0 {
@@ -82,14 +82,6 @@ impl Textures {
         let mut sheets = self.sheets.iter().enumerate();
         sheets.try_for_each(|(index, sheet)| sheet.write(&folder.join(sheet.name(index))))
     }
-}
-
-/// Number of a value in a list, to which it is added if it is new.
-fn number_of(list: &mut Vec<Value>, value: Value) -> usize {
-    list.iter().position(|other| *other == value).unwrap_or_else(|| {
-        list.push(value);
-        list.len() - 1
-    })
 }
 
 /// `KHR_texture_transform` of a matrix, none if it changes nothing, and false for one that shears: it

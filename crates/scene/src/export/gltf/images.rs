@@ -7,7 +7,7 @@ use image::ExtendedColorType;
 
 use crate::{
     error::Result,
-    export::{folder::safe_name, images::write_png},
+    export::{folder::safe_stem, images::write_png},
     math::colour::{luminance, srgb_from_linear},
     texture::{Channels, Texels, TextureUse},
 };
@@ -53,8 +53,7 @@ impl Sheet {
 
     pub(super) fn name(&self, index: usize) -> String {
         let name = self.sources().next().map_or("", |used| used.texture.name.as_str());
-        let stem = Path::new(name).file_stem().unwrap_or_default();
-        format!("t{index:02}_{}.png", safe_name(&stem.to_string_lossy()))
+        format!("t{index:02}_{}.png", safe_stem(name))
     }
 
     /// Tests whether 8 bits hold the values of all textures as well as they are known.
