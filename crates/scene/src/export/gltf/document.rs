@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, path::Path};
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::images::Sheet;
 use crate::{
@@ -26,8 +26,8 @@ const LINEAR: u32 = 9729;
 #[derive(Debug, Default)]
 pub(super) struct Textures {
     sheets: Vec<Sheet>,
-    samplers: Vec<Value>,
-    textures: Vec<Value>,
+    pub(super) samplers: Vec<Value>,
+    pub(super) textures: Vec<Value>,
     /// Names of the extensions that the document uses.
     pub(super) extensions: BTreeSet<&'static str>,
 }
@@ -35,7 +35,7 @@ pub(super) struct Textures {
 impl Textures {
     /// Adds an image that is looked up as `used`, or finds the same again. Returns the object that
     /// refers to it, and false if its transformation is not one of glTF.
-    pub(super) fn add(&mut self, sheet: Sheet, used: &TextureUse) -> (Map<String, Value>, bool) {
+    pub(super) fn add(&mut self, sheet: Sheet, used: &TextureUse) -> (Value, bool) {
         let source = number_of(&mut self.sheets, sheet, Sheet::is_same);
         let wrap = used.wrap.map(|wrap| match wrap {
             Wrap::Repeat => 10497,
@@ -48,34 +48,22 @@ impl Textures {
         let sampler = number_of(&mut self.samplers, sampler, Value::eq);
         let texture = json!({"source": source, "sampler": sampler});
         let index = number_of(&mut self.textures, texture, Value::eq);
-        let mut info = Map::new();
-        info.insert("index".to_owned(), index.into());
+        let mut info = json!({"index": index});
         if used.uv_set != 0 {
-            info.insert("texCoord".to_owned(), used.uv_set.into());
+            info["texCoord"] = used.uv_set.into();
         }
         let (transform, is_exact) = transform(used.image_from_uv);
         if let Some(transform) = transform {
             self.extensions.insert("KHR_texture_transform");
-            info.insert("extensions".to_owned(), json!({"KHR_texture_transform": transform}));
+            info["extensions"]["KHR_texture_transform"] = transform;
         }
         (info, is_exact)
     }
 
-    /// Adds the members of the document; `name_of` gives the URI of a file.
-    pub(super) fn add_to(
-        &self,
-        document: &mut Map<String, Value>,
-        uri_of: impl Fn(&str) -> String,
-    ) {
+    /// Images; `uri_of` gives the URI of a file.
+    pub(super) fn images(&self, uri_of: impl Fn(&str) -> String) -> Vec<Value> {
         let image = |(index, sheet): (usize, &Sheet)| json!({"uri": uri_of(&sheet.name(index))});
-        let images: Vec<Value> = self.sheets.iter().enumerate().map(image).collect();
-        for (name, list) in
-            [("images", &images), ("samplers", &self.samplers), ("textures", &self.textures)]
-        {
-            if !list.is_empty() {
-                document.insert(name.to_owned(), list.clone().into());
-            }
-        }
+        self.sheets.iter().enumerate().map(image).collect()
     }
 
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
@@ -130,35 +118,32 @@ pub(super) struct Attributes {
 
 impl Buffer {
     /// Adds the triangles of a part and returns a primitive without material.
-    pub(super) fn primitive(&mut self, part: &Part, attributes: Attributes) -> Map<String, Value> {
+    pub(super) fn primitive(&mut self, part: &Part, attributes: Attributes) -> Value {
         let vertices = &part.vertices;
-        let mut members = Map::new();
         let positions = vertices.iter().map(|vertex| vertex.position);
         let low = positions.clone().reduce(glam::Vec3::min).unwrap_or_default().to_array();
         let high = positions.reduce(glam::Vec3::max).unwrap_or_default().to_array();
         let index = self.vectors(vertices, |vertex| vertex.position.to_array());
         self.accessors[index]["min"] = json!(low);
         self.accessors[index]["max"] = json!(high);
-        members.insert("POSITION".to_owned(), index.into());
+        let mut members = json!({"POSITION": index});
         if attributes.normals {
-            let index =
-                self.vectors(vertices, |vertex| vertex.normal.normalize_or_zero().to_array());
-            members.insert("NORMAL".to_owned(), index.into());
+            let normal = |vertex: &Vertex| vertex.normal.normalize_or_zero().to_array();
+            members["NORMAL"] = self.vectors(vertices, normal).into();
         }
         if attributes.tangents {
-            let index = self.vectors(vertices, |vertex| {
+            let tangent = |vertex: &Vertex| {
                 let along = vertex.tangent.truncate().normalize_or(glam::Vec3::X);
                 along.extend(if vertex.tangent.w < 0.0 { -1.0 } else { 1.0 }).to_array()
-            });
-            members.insert("TANGENT".to_owned(), index.into());
+            };
+            members["TANGENT"] = self.vectors(vertices, tangent).into();
         }
         for set in 0..attributes.uv_sets {
             let index = self.vectors(vertices, |vertex| vertex.uvs[set].to_array());
-            members.insert(format!("TEXCOORD_{set}"), index.into());
+            members[format!("TEXCOORD_{set}")] = index.into();
         }
         if attributes.colors {
-            let index = self.vectors(vertices, |vertex| vertex.color.to_array());
-            members.insert("COLOR_0".to_owned(), index.into());
+            members["COLOR_0"] = self.vectors(vertices, |vertex| vertex.color.to_array()).into();
         }
         let start = self.bytes.len();
         for index in part.triangles.iter().flatten() {
@@ -166,10 +151,7 @@ impl Buffer {
         }
         let count = 3 * part.triangles.len();
         let indices = self.accessor(start, ELEMENT_ARRAY_BUFFER, UNSIGNED_INT, "SCALAR", count);
-        let mut primitive = Map::new();
-        primitive.insert("attributes".to_owned(), members.into());
-        primitive.insert("indices".to_owned(), indices.into());
-        primitive
+        json!({"attributes": members, "indices": indices})
     }
 
     fn vectors<const N: usize>(

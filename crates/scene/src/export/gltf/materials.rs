@@ -1,7 +1,7 @@
 //! Materials → metallic-roughness materials with their extensions.
 
 use glam::Vec3;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::{
     document::Textures,
@@ -20,9 +20,8 @@ const DEFAULT_IOR: f32 = 1.5;
 pub(super) struct Translator<'a> {
     pub(super) subject: Subject<'a>,
     pub(super) textures: &'a mut Textures,
-    /// Members of the material and of its extensions.
-    pub(super) members: Map<String, Value>,
-    pub(super) extensions: Map<String, Value>,
+    /// Members of the material.
+    pub(super) members: Value,
 }
 
 /// Factors of the core model.
@@ -59,24 +58,21 @@ impl<'a> Translator<'a> {
             let sheet = Sheet { layout: Layout::Normal, first: Some(used.clone()), second: None };
             let mut info = self.texture(sheet, used);
             if surface.normal_scale != 1.0 {
-                info.insert("scale".to_owned(), json!(surface.normal_scale));
+                info["scale"] = json!(surface.normal_scale);
             }
-            self.members.insert("normalTexture".to_owned(), info.into());
+            self.members["normalTexture"] = info;
         }
         self.opacity();
         // The back of a double-sided material emits too.
         let is_double = surface.emission.as_ref().map_or(surface.two_sided, |own| own.two_sided);
-        self.members.insert("doubleSided".to_owned(), is_double.into());
-        self.members.insert("name".to_owned(), self.subject.material.name.clone().into());
-        if !self.extensions.is_empty() {
-            self.members.insert("extensions".to_owned(), self.extensions.into());
-        }
-        self.members.into()
+        self.members["doubleSided"] = is_double.into();
+        self.members["name"] = self.subject.material.name.clone().into();
+        self.members
     }
 
     fn extension(&mut self, name: &'static str, value: Value) {
         self.textures.extensions.insert(name);
-        self.extensions.insert(name.to_owned(), value);
+        self.members["extensions"][name] = value;
     }
 
     /// Tests for a surface that shows the same colour in any light.
@@ -188,20 +184,21 @@ impl<'a> Translator<'a> {
         let largest = peak(color);
         let base_color = (core.base_color * largest).clamp(Vec3::ZERO, Vec3::ONE);
         let opacity = surface.opacity.factor;
-        let mut pbr = Map::new();
-        pbr.insert("baseColorFactor".to_owned(), json!(base_color.extend(opacity).to_array()));
-        pbr.insert("metallicFactor".to_owned(), json!(core.metallic));
-        pbr.insert("roughnessFactor".to_owned(), json!(core.roughness));
+        let mut pbr = json!({
+            "baseColorFactor": base_color.extend(opacity).to_array(),
+            "metallicFactor": core.metallic,
+            "roughnessFactor": core.roughness,
+        });
         let layout = Layout::ColorOpacity(largest);
         let pair = [color, surface.opacity.texture.as_ref()];
         if let Some(info) = self.pair(layout, pair, ["colour", "opacity"]) {
-            pbr.insert("baseColorTexture".to_owned(), info.into());
+            pbr["baseColorTexture"] = info;
         }
         let pair = [surface.roughness.as_ref(), surface.metallic.as_ref()];
         if let Some(info) = self.pair(Layout::RoughnessMetal, pair, ["roughness", "metal"]) {
-            pbr.insert("metallicRoughnessTexture".to_owned(), info.into());
+            pbr["metallicRoughnessTexture"] = info;
         }
-        self.members.insert("pbrMetallicRoughness".to_owned(), pbr.into());
+        self.members["pbrMetallicRoughness"] = pbr;
     }
 
     /// Reference to an image of one or two textures. Two must lie in the same way on the surface and
@@ -211,7 +208,7 @@ impl<'a> Translator<'a> {
         layout: Layout,
         [first, second]: [Option<&TextureUse>; 2],
         names: [&str; 2],
-    ) -> Option<Map<String, Value>> {
+    ) -> Option<Value> {
         let used = first.or(second)?;
         let is_alike = |other: &&TextureUse| {
             let place = |used: &TextureUse| {
@@ -232,7 +229,7 @@ impl<'a> Translator<'a> {
         Some(self.texture(sheet, used))
     }
 
-    fn texture(&mut self, sheet: Sheet, used: &TextureUse) -> Map<String, Value> {
+    fn texture(&mut self, sheet: Sheet, used: &TextureUse) -> Value {
         let (info, is_exact) = self.textures.add(sheet, used);
         if !is_exact {
             self.subject.warn(
@@ -247,7 +244,7 @@ impl<'a> Translator<'a> {
         let largest = peak(emission.texture.as_ref());
         let radiance = emission.radiance * largest;
         let strength = radiance.max_element().max(1.0);
-        self.members.insert("emissiveFactor".to_owned(), json!((radiance / strength).to_array()));
+        self.members["emissiveFactor"] = json!((radiance / strength).to_array());
         if strength > 1.0 {
             let value = json!({"emissiveStrength": strength});
             self.extension("KHR_materials_emissive_strength", value);
@@ -256,7 +253,7 @@ impl<'a> Translator<'a> {
             let layout = Layout::ColorOpacity(largest);
             let sheet = Sheet { layout, first: Some(used.clone()), second: None };
             let info = self.texture(sheet, used);
-            self.members.insert("emissiveTexture".to_owned(), info.into());
+            self.members["emissiveTexture"] = info;
         }
     }
 
@@ -265,10 +262,10 @@ impl<'a> Translator<'a> {
         let opacity = &surface.opacity;
         let has_colors = surface.vertex_color && self.subject.triangles.has_transparency;
         if let Some(cutoff) = opacity.cutoff {
-            self.members.insert("alphaMode".to_owned(), "MASK".into());
-            self.members.insert("alphaCutoff".to_owned(), json!(cutoff));
+            self.members["alphaMode"] = "MASK".into();
+            self.members["alphaCutoff"] = json!(cutoff);
         } else if opacity.factor < 1.0 || opacity.texture.is_some() || has_colors {
-            self.members.insert("alphaMode".to_owned(), "BLEND".into());
+            self.members["alphaMode"] = "BLEND".into();
         }
     }
 }

@@ -16,7 +16,7 @@ mod nodes;
 use std::{io::Write, path::Path};
 
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use self::{
     document::{Attributes, Buffer, Textures},
@@ -44,8 +44,7 @@ pub fn export<'a>(scene: &'a Scene, path: &Path) -> Export<'a> {
         let translator = Translator {
             subject: Subject::new("glTF", material, parts, &mut warnings),
             textures: &mut textures,
-            members: Map::new(),
-            extensions: Map::new(),
+            members: json!({}),
         };
         translator.translate()
     });
@@ -81,33 +80,33 @@ pub fn export<'a>(scene: &'a Scene, path: &Path) -> Export<'a> {
         );
         let uri_of = |name: &str| format!("{}/{name}", utf8_percent_encode(&folder.name, IN_URI));
         let version = env!("CARGO_PKG_VERSION");
-        let mut document = Map::new();
-        let mut insert = |name: &str, value: Value| {
-            let is_empty = value.as_array().is_some_and(Vec::is_empty);
-            if !is_empty {
-                document.insert(name.to_owned(), value);
-            }
-        };
-        insert("asset", json!({"version": "2.0", "generator": format!("Fenestra {version}")}));
-        insert("extensionsUsed", json!(textures.extensions));
-        insert("scene", json!(0));
-        insert("scenes", json!([{"nodes": (0..nodes.len()).collect::<Vec<_>>()}]));
-        insert("nodes", nodes.into());
-        insert("cameras", json!([camera]));
-        insert("meshes", meshes.into());
-        insert("materials", materials.clone().into());
-        insert("accessors", buffer.accessors.into());
-        insert("bufferViews", buffer.views.into());
+        let mut document = json!({
+            "asset": {"version": "2.0", "generator": format!("Fenestra {version}")},
+            "extensionsUsed": textures.extensions,
+            "scene": 0,
+            "scenes": [{"nodes": (0..nodes.len()).collect::<Vec<_>>()}],
+            "nodes": nodes,
+            "cameras": [camera],
+            "meshes": meshes,
+            "materials": materials,
+            "accessors": buffer.accessors,
+            "bufferViews": buffer.views,
+            "images": textures.images(uri_of),
+            "samplers": textures.samplers,
+            "textures": textures.textures,
+        });
         if !buffer.bytes.is_empty() {
             let name = "meshes.bin";
-            let buffers = json!([{"uri": uri_of(name), "byteLength": buffer.bytes.len()}]);
-            insert("buffers", buffers);
+            document["buffers"] = json!([{"uri": uri_of(name), "byteLength": buffer.bytes.len()}]);
             files::write_atomically(&folder.path.join(name), |file| file.write_all(&buffer.bytes))?;
         }
         if !lights.is_empty() {
-            insert("extensions", json!({"KHR_lights_punctual": {"lights": lights}}));
+            document["extensions"] = json!({"KHR_lights_punctual": {"lights": lights}});
         }
-        textures.add_to(&mut document, uri_of);
+        // glTF has no empty lists.
+        if let Some(members) = document.as_object_mut() {
+            members.retain(|_, value| *value != json!([]));
+        }
         textures.write(&folder.path)?;
         // As it is, before its rotation
         let map = &scene.environment;
@@ -142,7 +141,7 @@ fn meshes(scene: &Scene, parts: &[Parts]) -> (Vec<Value>, Buffer) {
                     && part.vertices.iter().any(|vertex| vertex.color != glam::Vec4::ONE),
             };
             let mut primitive = buffer.primitive(part, attributes);
-            primitive.insert("material".to_owned(), index.into());
+            primitive["material"] = index.into();
             let name = identifier(index, &material.name);
             meshes.push(json!({"name": name, "primitives": [primitive]}));
         }
