@@ -35,9 +35,12 @@ impl Folder {
         &self,
         name: &str,
         part: &Part,
+        is_flat: bool,
         attributes: Attributes,
     ) -> Result<String> {
-        files::write_atomically(&self.path.join(name), |file| ply::write(file, part, attributes))?;
+        files::write_atomically(&self.path.join(name), |file| {
+            ply::write(file, part, is_flat, attributes)
+        })?;
         Ok(self.relative(name))
     }
 

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use rayon::prelude::*;
 
-use super::{folder::safe_stem, number_of};
+use super::{folder::safe_stem, number_of, ply::SAME_UV};
 use crate::{
     coat::base_below_coat,
     error::Result,
@@ -74,11 +74,7 @@ impl Pictures {
     pub(super) fn add(&mut self, used: &TextureUse, recipe: Recipe) -> Bitmap {
         // Coordinates and wrap modes belong to the look-up, but an enlarged image depends on the latter.
         let picture = Picture {
-            used: TextureUse {
-                image_from_uv: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-                uv_set: 0,
-                ..used.clone()
-            },
+            used: TextureUse { image_from_uv: SAME_UV, uv_set: 0, ..used.clone() },
             recipe,
         };
         let is_same = |one: &Picture, other: &Picture| {

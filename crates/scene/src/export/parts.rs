@@ -34,11 +34,7 @@ pub(super) struct Part {
 
 /// Triangles of one material: those with normals at all corners, and the flat ones.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Parts {
-    /// Shaded by their normals.
-    pub(super) smooth: Part,
-    pub(super) flat: Part,
-}
+pub(super) struct Parts([Part; 2]);
 
 /// Facts about the triangles of a material that its translation depends on.
 #[derive(Clone, Copy, Debug, Default)]
@@ -64,8 +60,7 @@ pub(super) fn divide(scene: &Scene) -> Vec<Parts> {
     for (triangle, &material) in triangles.iter().zip(materials) {
         let corners = triangle.map(|at| vertex(&scene.geometry, at as usize));
         let is_flat = corners.iter().any(|corner| corner.normal == Vec3::ZERO);
-        let Parts { smooth, flat } = &mut all[material as usize];
-        let part = if is_flat { flat } else { smooth };
+        let part = &mut all[material as usize].0[usize::from(is_flat)];
         let places = &mut places[material as usize][usize::from(is_flat)];
         let indices = [0, 1, 2].map(|corner| {
             *places.entry(triangle[corner]).or_insert_with(|| {
@@ -93,8 +88,7 @@ fn vertex(geometry: &Geometry, at: usize) -> Vertex {
 impl Parts {
     /// The parts that have triangles, and true for the flat one.
     pub(super) fn each(&self) -> impl Iterator<Item = (&Part, bool)> {
-        let parts = [(&self.smooth, false), (&self.flat, true)];
-        parts.into_iter().filter(|(part, _)| !part.triangles.is_empty())
+        self.0.iter().zip([false, true]).filter(|(part, _)| !part.triangles.is_empty())
     }
 
     /// Collects the facts; `normal` is the normal map of the material.

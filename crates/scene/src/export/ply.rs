@@ -2,18 +2,16 @@
 
 use std::io::{self, Write};
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use super::parts::{Part, Vertex};
 
-/// Properties of vertices beside their positions.
+/// Properties of vertices that the material needs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Attributes {
-    pub(super) normals: bool,
-    /// Set of texture coordinates to write.
-    pub(super) uv_set: Option<usize>,
-    /// Coordinates that are written in place of those of the mesh: the rows of a matrix for (u, v, 1).
-    pub(super) written_from_uv: [[f32; 3]; 2],
+    /// Set of texture coordinates, and those that are written in its place: the rows of a matrix for
+    /// (u, v, 1).
+    pub(super) uvs: Option<(usize, [[f32; 3]; 2])>,
     /// Factor of the colours, if they are written.
     pub(super) color_factor: Option<Vec3>,
 }
@@ -21,17 +19,22 @@ pub(super) struct Attributes {
 /// Rows of the matrix that leaves texture coordinates as they are.
 pub(super) const SAME_UV: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
-/// Writes a part as little-endian PLY.
+/// Writes a part as little-endian PLY, without normals if it is flat.
 ///
 /// # Errors
 /// Those of `file`.
-pub(super) fn write(file: &mut impl Write, part: &Part, attributes: Attributes) -> io::Result<()> {
-    let Attributes { normals, uv_set, written_from_uv, color_factor } = attributes;
+pub(super) fn write(
+    file: &mut impl Write,
+    part: &Part,
+    is_flat: bool,
+    attributes: Attributes,
+) -> io::Result<()> {
+    let Attributes { uvs: written, color_factor } = attributes;
     let mut properties = String::new();
     for (is_there, names) in [
         (true, &["x", "y", "z"][..]),
-        (normals, &["nx", "ny", "nz"]),
-        (uv_set.is_some(), &["u", "v"]),
+        (!is_flat, &["nx", "ny", "nz"]),
+        (written.is_some(), &["u", "v"]),
         (color_factor.is_some(), &["r", "g", "b"]),
     ] {
         for name in names.iter().filter(|_| is_there) {
@@ -47,12 +50,12 @@ pub(super) fn write(file: &mut impl Write, part: &Part, attributes: Attributes) 
     )?;
     for &Vertex { position, normal, uvs, color, .. } in &part.vertices {
         write_numbers(file, position.to_array())?;
-        if normals {
+        if !is_flat {
             write_numbers(file, normal.to_array())?;
         }
-        if let Some(set) = uv_set {
-            let uv: Vec2 = uvs[set & 1];
-            write_numbers(file, written_from_uv.map(|row| Vec3::from(row).dot(uv.extend(1.0))))?;
+        if let Some((set, rows)) = written {
+            let uv = uvs[set & 1].extend(1.0);
+            write_numbers(file, rows.map(|row| Vec3::from(row).dot(uv)))?;
         }
         if let Some(factor) = color_factor {
             write_numbers(file, (factor * color.truncate()).to_array())?;

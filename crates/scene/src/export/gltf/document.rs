@@ -10,6 +10,7 @@ use crate::{
     export::{
         number_of,
         parts::{Part, Vertex},
+        ply::SAME_UV,
     },
     texture::{Interpolation, TextureUse, Wrap},
 };
@@ -75,7 +76,7 @@ impl Textures {
 /// `KHR_texture_transform` of a matrix, none if it changes nothing, and false for one that shears: it
 /// scales first, then turns, then shifts.
 fn transform([[a, b, u], [c, d, v]]: [[f32; 3]; 2]) -> (Option<Value>, bool) {
-    if [[a, b, u], [c, d, v]] == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] {
+    if [[a, b, u], [c, d, v]] == SAME_UV {
         return (None, true);
     }
     // The first column is (cos, −sin) · scale_u, the second (sin, cos) · scale_v.

@@ -29,7 +29,6 @@ use super::{
     images::Pictures,
     left_out,
     parts::{self, Parts},
-    ply::{Attributes, SAME_UV},
     subject::Subject,
     triple,
 };
@@ -83,15 +82,8 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
                     meshes.push((format!("{id}{suffix}_back.ply"), back));
                 }
                 for (name, part) in meshes {
-                    let attributes = Attributes {
-                        normals: !is_flat,
-                        uv_set: model.uv_set,
-                        written_from_uv: SAME_UV,
-                        color_factor: model.color_factor,
-                    };
-                    let file = folder.write_mesh(&name, &part, attributes)?;
-                    let emitter = model.emitter.as_deref().unwrap_or_default();
-                    let emitter = indented(&indented(emitter));
+                    let file = folder.write_mesh(&name, &part, is_flat, model.attributes)?;
+                    let emitter = indented(&indented(&model.emitter));
                     let medium = indented(&indented(&interior(&scene.materials[index].kind)));
                     _ = write!(
                         xml,

@@ -9,6 +9,7 @@ use crate::{
     export::{
         folder::Folder,
         images::{Pictures, Recipe},
+        ply::{Attributes, SAME_UV},
         subject::{Opacity, Subject, difference_of_index, index_of},
         triple,
     },
@@ -27,14 +28,12 @@ const LEAST_ETA: f32 = 1.001;
 #[derive(Debug)]
 pub(super) struct Model {
     pub(super) bsdf: String,
-    /// `emitter` element for the shapes, if they emit.
-    pub(super) emitter: Option<String>,
+    /// `emitter` element for the shapes; empty unless they emit.
+    pub(super) emitter: String,
     /// True if the shapes are repeated with their back to the front.
     pub(super) has_back: bool,
-    /// Set of texture coordinates that the shapes need.
-    pub(super) uv_set: Option<usize>,
-    /// Factor of the colours of vertices, if the shapes need them.
-    pub(super) color_factor: Option<Vec3>,
+    /// Properties of vertices that the shapes need.
+    pub(super) attributes: Attributes,
 }
 
 /// Material on its way to a [`Model`].
@@ -69,13 +68,9 @@ impl Translator<'_> {
                 "its textures read two sets of coordinates, Mitsuba's only the first of them",
             );
         }
-        Model {
-            bsdf,
-            emitter,
-            has_back,
-            uv_set: uv_set.map(|set| set as usize),
-            color_factor: self.color_factor,
-        }
+        let uvs = uv_set.map(|set| (set as usize, SAME_UV));
+        let attributes = Attributes { uvs, color_factor: self.color_factor };
+        Model { bsdf, emitter, has_back, attributes }
     }
 
     fn warn_of_masking(&mut self, alpha: f32, kind: &str) {
@@ -279,7 +274,7 @@ impl Translator<'_> {
             wrap(0),
         );
         let [[a, b, c], [d, e, f]] = used.image_from_uv;
-        if used.image_from_uv != [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] {
+        if used.image_from_uv != SAME_UV {
             _ = write!(
                 content,
                 "    <transform name=\"to_uv\">\n        \
@@ -318,9 +313,9 @@ impl Translator<'_> {
     }
 
     /// Emitter of the surface, and true if its back emits too.
-    fn light(&mut self, is_glass: bool) -> (Option<String>, bool) {
+    fn light(&mut self, is_glass: bool) -> (String, bool) {
         let surface = self.subject.surface;
-        let Some(emission) = &surface.emission else { return (None, false) };
+        let Some(emission) = &surface.emission else { return Default::default() };
         let radiance = match &emission.texture {
             Some(used) => self.bitmap("radiance", used, Recipe::Color(emission.radiance)),
             None => rgb("radiance", emission.radiance),
@@ -336,7 +331,7 @@ impl Translator<'_> {
                 .warn("Mitsuba's surfaces emit in front only; the light of the back is left out");
         }
         let emitter = format!("<emitter type=\"area\">\n{radiance}</emitter>\n");
-        (Some(emitter), emission.two_sided && can_have_back)
+        (emitter, emission.two_sided && can_have_back)
     }
 }
 

@@ -10,7 +10,7 @@ use crate::{
     export::{
         folder::Folder,
         images::{Pictures, Recipe},
-        ply::SAME_UV,
+        ply::Attributes,
         subject::{Opacity, Subject, index_of},
     },
     material::{ConductorFresnel, MaterialKind},
@@ -31,9 +31,8 @@ pub(super) struct Model {
     pub(super) light: String,
     /// Parameter of shapes for a surface that is not opaque.
     pub(super) alpha: String,
-    /// Set of texture coordinates that the shapes need, and those written in their place.
-    pub(super) uv_set: Option<usize>,
-    pub(super) written_from_uv: [[f32; 3]; 2],
+    /// Properties of vertices that the shapes need.
+    pub(super) attributes: Attributes,
 }
 
 /// Material on its way to a [`Model`].
@@ -83,18 +82,12 @@ impl<'a> Translator<'a> {
             "{}MakeNamedMaterial \"{id}\" \"string type\" \"{kind}\"{parameters}\n",
             self.textures
         );
-        let base = self.base;
-        Model {
-            text,
-            light,
-            alpha,
-            uv_set: base.map(|base| base.uv_set as usize),
-            written_from_uv: base.map_or(SAME_UV, |base| {
-                // v points up in pbrt, down in images.
-                let [row_u, [a, b, c]] = base.image_from_uv;
-                [row_u, [-a, -b, 1.0 - c]]
-            }),
-        }
+        let uvs = self.base.map(|base| {
+            // v points up in pbrt, down in images.
+            let [row_u, [a, b, c]] = base.image_from_uv;
+            (base.uv_set as usize, [row_u, [-a, -b, 1.0 - c]])
+        });
+        Model { text, light, alpha, attributes: Attributes { uvs, color_factor: None } }
     }
 
     /// Kind of the material, and its parameters.

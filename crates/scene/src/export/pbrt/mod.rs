@@ -25,7 +25,6 @@ use super::{
     has_media,
     images::Pictures,
     left_out, parts,
-    ply::Attributes,
     subject::Subject,
 };
 use crate::{Camera, Filter, Scene, files};
@@ -76,13 +75,7 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
             }
             for (part, is_flat) in parts.each() {
                 let name = format!("{id}{}.ply", if is_flat { "_flat" } else { "" });
-                let attributes = Attributes {
-                    normals: !is_flat,
-                    uv_set: model.uv_set,
-                    written_from_uv: model.written_from_uv,
-                    color_factor: None,
-                };
-                let file = folder.write_mesh(&name, part, attributes)?;
+                let file = folder.write_mesh(&name, part, is_flat, model.attributes)?;
                 let alpha = &model.alpha;
                 _ = writeln!(text, "Shape \"plymesh\" \"string filename\" \"{file}\"{alpha}");
             }
