@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::models::{indented, property, rgb};
 use crate::{
     EnvironmentMap, Lamp,
     error::Result,
@@ -11,20 +12,17 @@ use crate::{
 
 /// Returns the emitter of a lamp, and warns where it is not Fenestra's.
 pub(super) fn lamp(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
-    let colour =
-        |name: &str, value| format!("        <rgb name=\"{name}\" value=\"{}\"/>\n", triple(value));
-    let point = |name: &str, value: Vec3| {
+    let point = |tag: &str, name: &str, value: Vec3| {
         let [x, y, z] = value.to_array();
-        format!("<{name} x=\"{x}\" y=\"{y}\" z=\"{z}\"/>")
+        format!("    <{tag} name=\"{name}\" x=\"{x}\" y=\"{y}\" z=\"{z}\"/>\n")
     };
-    let (kind, content) = match lamp.kind {
+    match lamp.kind {
         LampKind::Point { position, intensity } => {
-            let place = point("point name=\"position\"", position);
-            ("point", format!("        {place}\n{}", colour("intensity", intensity)))
+            emitter("point", &(point("point", "position", position) + &rgb("intensity", intensity)))
         }
         LampKind::Directional { direction, irradiance } => {
-            let along = point("vector name=\"direction\"", direction);
-            ("directional", format!("        {along}\n{}", colour("irradiance", irradiance)))
+            let along = point("vector", "direction", direction);
+            emitter("directional", &(along + &rgb("irradiance", irradiance)))
         }
         LampKind::Spot(spot) => {
             if spot.falloff != SpotFalloff::LinearAngle {
@@ -35,24 +33,26 @@ pub(super) fn lamp(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
                 ));
             }
             let target = spot.position.as_dvec3() + spot.direction.as_dvec3();
-            let content = format!(
-                "        <transform name=\"to_world\">\n            <lookat origin=\"{}\" \
-                 target=\"{}, {}, {}\" up=\"{}\"/>\n        </transform>\n{}        \
-                 <float name=\"cutoff_angle\" value=\"{}\"/>\n        \
-                 <float name=\"beam_width\" value=\"{}\"/>\n",
+            let place = format!(
+                "    <transform name=\"to_world\">\n        <lookat origin=\"{}\" target=\"{}, {}, {}\" \
+                 up=\"{}\"/>\n    </transform>\n",
                 triple(spot.position),
                 target.x,
                 target.y,
                 target.z,
                 triple(spot.direction.any_orthonormal_vector()),
-                colour("intensity", spot.intensity),
-                spot.outer_angle_rad.to_degrees(),
-                spot.inner_angle_rad.to_degrees()
             );
-            ("spot", content)
+            let angles = [
+                property("float", "cutoff_angle", spot.outer_angle_rad.to_degrees()),
+                property("float", "beam_width", spot.inner_angle_rad.to_degrees()),
+            ];
+            emitter("spot", &(place + &rgb("intensity", spot.intensity) + &angles.concat()))
         }
-    };
-    format!("    <emitter type=\"{kind}\">\n{content}    </emitter>\n")
+    }
+}
+
+fn emitter(kind: &str, content: &str) -> String {
+    indented(&format!("<emitter type=\"{kind}\">\n{content}</emitter>\n"))
 }
 
 /// Writes the environment into `folder` and returns its emitter; black ones need none.
@@ -66,11 +66,7 @@ pub(super) fn write_environment(map: &EnvironmentMap, folder: &Folder) -> Result
         return Ok(String::new());
     }
     if let Some(radiance) = map.uniform_radiance() {
-        return Ok(format!(
-            "    <emitter type=\"constant\">\n        <rgb name=\"radiance\" value=\"{}\"/>\n    \
-             </emitter>\n",
-            triple(radiance)
-        ));
+        return Ok(emitter("constant", &rgb("radiance", radiance)));
     }
     let (width, height) = (map.width as usize, map.height as usize);
     let texel = |column: usize, row: usize| map.texels[row * width + column];
@@ -78,11 +74,9 @@ pub(super) fn write_environment(map: &EnvironmentMap, folder: &Folder) -> Result
         let [above, below] = [row.saturating_sub(1) / 2, (row / 2).min(height - 1)];
         0.5 * texel(column, above) + 0.5 * texel(column, below)
     })?;
-    Ok(format!(
-        "    <emitter type=\"envmap\">\n        <string name=\"filename\" value=\"{}\"/>\n        \
-         <transform name=\"to_world\">\n            <rotate y=\"1\" angle=\"{}\"/>\n        \
-         </transform>\n    </emitter>\n",
-        file,
-        f64::from(map.rotation_rad).to_degrees() + 180.0
-    ))
+    let turn = f64::from(map.rotation_rad).to_degrees() + 180.0;
+    let place = format!(
+        "    <transform name=\"to_world\">\n        <rotate y=\"1\" angle=\"{turn}\"/>\n    </transform>\n"
+    );
+    Ok(emitter("envmap", &(property("string", "filename", file) + &place)))
 }

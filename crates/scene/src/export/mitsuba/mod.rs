@@ -21,7 +21,7 @@ mod models;
 
 use std::{fmt::Write, path::Path};
 
-use self::models::{Model, Translator, indented, interior};
+use self::models::{Model, Translator, indented, interior, property};
 use super::{
     Export, Settings,
     folder::{Folder, identifier},
@@ -110,9 +110,7 @@ fn sensor(scene: &Scene, parts: &[Parts], samples: u32) -> String {
     let far = 2.0 * corner.max(1e-3);
     let kind = if aperture_radius > 0.0 { "thinlens" } else { "perspective" };
     let mut xml = format!("    <sensor type=\"{kind}\">\n");
-    let mut number = |name: &str, value: f32| {
-        _ = writeln!(xml, "        <float name=\"{name}\" value=\"{value}\"/>");
-    };
+    let mut number = |name, value: f32| xml += &indented(&property("float", name, value));
     number("fov", vertical_fov_deg);
     if aperture_radius > 0.0 {
         number("aperture_radius", aperture_radius);

@@ -1,6 +1,9 @@
 //! Materials → `bsdf` elements, and the light of their surfaces.
 
-use std::{fmt::Write, path::Path};
+use std::{
+    fmt::{Display, Write},
+    path::Path,
+};
 
 use glam::Vec3;
 
@@ -94,7 +97,7 @@ impl Translator<'_> {
                 content += &self.color("diffuse_reflectance", base);
                 content += &float("int_ior", *ior);
                 content += &float("ext_ior", 1.0);
-                content += "    <boolean name=\"nonlinear\" value=\"false\"/>\n";
+                content += &property("boolean", "nonlinear", false);
                 element("roughplastic", &content)
             }
             MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
@@ -138,7 +141,7 @@ impl Translator<'_> {
                 element("principled", &content)
             }
             MaterialKind::Mirror { reflectance } => {
-                let content = "    <string name=\"material\" value=\"none\"/>\n".to_owned()
+                let content = property("string", "material", "none")
                     + &self.color("specular_reflectance", *reflectance);
                 element("conductor", &content)
             }
@@ -179,7 +182,7 @@ impl Translator<'_> {
             ));
         }
         let name = self.pictures.copy(path);
-        element("measured", &string("filename", &self.folder.relative(&name)))
+        element("measured", &property("string", "filename", self.folder.relative(&name)))
     }
 
     /// Base of Mitsuba's plastic, which loses light below its coat, that reflects as much as ours.
@@ -223,10 +226,8 @@ impl Translator<'_> {
         }
         if is_of_vertices {
             self.color_factor = Some(factor);
-            return format!(
-                "    <texture type=\"mesh_attribute\" name=\"{name}\">\n        \
-                 <string name=\"name\" value=\"vertex_color\"/>\n    </texture>\n"
-            );
+            let content = property("string", "name", "vertex_color");
+            return texture("mesh_attribute", name, &content);
         }
         rgb(name, factor)
     }
@@ -248,7 +249,7 @@ impl Translator<'_> {
             Some((used, recipe)) => self.bitmap("alpha", used, recipe),
             None => float("alpha", alpha),
         };
-        "    <string name=\"distribution\" value=\"ggx\"/>\n".to_owned() + &alpha
+        property("string", "distribution", "ggx") + &alpha
     }
 
     /// Texture element; the image is written later.
@@ -263,16 +264,11 @@ impl Translator<'_> {
             ));
         }
         let bitmap = self.pictures.add(used, recipe);
-        let mut content = format!(
-            "    <string name=\"filename\" value=\"{}\"/>\n    \
-             <boolean name=\"raw\" value=\"{}\"/>\n    \
-             <string name=\"filter_type\" value=\"{}\"/>\n    \
-             <string name=\"wrap_mode\" value=\"{}\"/>\n",
-            self.folder.relative(&bitmap.name),
-            bitmap.is_raw,
-            if bitmap.is_nearest { "nearest" } else { "bilinear" },
-            wrap(0),
-        );
+        let filter = if bitmap.is_nearest { "nearest" } else { "bilinear" };
+        let mut content = property("string", "filename", self.folder.relative(&bitmap.name))
+            + &property("boolean", "raw", bitmap.is_raw)
+            + &property("string", "filter_type", filter)
+            + &property("string", "wrap_mode", wrap(0));
         let [[a, b, c], [d, e, f]] = used.image_from_uv;
         if used.image_from_uv != SAME_UV {
             _ = write!(
@@ -282,7 +278,7 @@ impl Translator<'_> {
                  </transform>\n"
             );
         }
-        indented(&format!("<texture type=\"bitmap\" name=\"{name}\">\n{content}</texture>\n"))
+        texture("bitmap", name, &content)
     }
 
     /// Normal map around a model. It stands around `twosided`: inside, it would mirror the bumps
@@ -297,7 +293,7 @@ impl Translator<'_> {
             );
         }
         let content = self.bitmap("normalmap", normal, recipe)
-            + "    <boolean name=\"use_shadowing_function\" value=\"false\"/>\n";
+            + &property("boolean", "use_shadowing_function", false);
         around("normalmap", &content, bsdf)
     }
 
@@ -347,17 +343,13 @@ fn element(kind: &str, content: &str) -> String {
     format!("<bsdf type=\"{kind}\">\n{content}</bsdf>\n")
 }
 
+fn texture(kind: &str, name: &str, content: &str) -> String {
+    indented(&format!("<texture type=\"{kind}\" name=\"{name}\">\n{content}</texture>\n"))
+}
+
 /// Element with parameters around a model.
 fn around(kind: &str, content: &str, bsdf: &str) -> String {
     element(kind, &format!("{content}{}", indented(bsdf)))
-}
-
-fn string(name: &str, value: &str) -> String {
-    format!("    <string name=\"{name}\" value=\"{value}\"/>\n")
-}
-
-fn float(name: &str, value: f32) -> String {
-    format!("    <float name=\"{name}\" value=\"{value}\"/>\n")
 }
 
 /// Medium inside a dielectric that absorbs.
@@ -367,8 +359,17 @@ pub(super) fn interior(kind: &MaterialKind) -> String {
     format!("<medium name=\"interior\" type=\"homogeneous\">\n{content}</medium>\n")
 }
 
-fn rgb(name: &str, value: Vec3) -> String {
-    format!("    <rgb name=\"{name}\" value=\"{}\"/>\n", triple(value))
+/// Parameter of an element, on a line of its own.
+pub(super) fn property(kind: &str, name: &str, value: impl Display) -> String {
+    format!("    <{kind} name=\"{name}\" value=\"{value}\"/>\n")
+}
+
+fn float(name: &str, value: f32) -> String {
+    property("float", name, value)
+}
+
+pub(super) fn rgb(name: &str, value: Vec3) -> String {
+    property("rgb", name, triple(value))
 }
 
 /// Moves lines to the right by one level.
