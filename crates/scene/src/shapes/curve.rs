@@ -24,16 +24,7 @@ pub(super) fn smooth(points: &[DVec4], per_span: usize, closed: bool) -> Vec<DVe
             }
             None => {
                 let count = points.len();
-                let at = |index: usize| points[index % count];
-                return (0..count)
-                    .flat_map(|span| {
-                        let neighbours =
-                            [at(span + count - 1), at(span), at(span + 1), at(span + 2)];
-                        (0..per_span).map(move |piece| {
-                            span_point(neighbours, piece as f64 / per_span as f64)
-                        })
-                    })
-                    .collect();
+                return pieces(count, per_span, |index| points[(index + count - 1) % count]);
             }
         }
     }
@@ -51,24 +42,27 @@ pub(super) fn smooth(points: &[DVec4], per_span: usize, closed: bool) -> Vec<DVe
 
 /// Open spline, ends included; straight if it has only two points.
 fn smooth_run(run: &[DVec4], per_span: usize) -> Vec<DVec4> {
-    let [first, .., last] = run else { return run.to_vec() };
-    if run.len() == 2 {
+    if run.len() < 3 {
         return run.to_vec();
     }
-    let at = |index: isize| match usize::try_from(index) {
-        Err(_) => 2.0 * first - run[1],
-        Ok(index) if index >= run.len() => 2.0 * last - run[run.len() - 2],
-        Ok(index) => run[index],
+    let last = run.len() - 1;
+    let at = |index: usize| match index.checked_sub(1) {
+        None => 2.0 * run[0] - run[1],
+        Some(index) if index > last => 2.0 * run[last] - run[last - 1],
+        Some(index) => run[index],
     };
-    let spans = run.len() as isize - 1;
-    let mut curve: Vec<DVec4> = (0..spans)
-        .flat_map(|span| {
-            let neighbours = [at(span - 1), at(span), at(span + 1), at(span + 2)];
-            (0..per_span).map(move |piece| span_point(neighbours, piece as f64 / per_span as f64))
-        })
-        .collect();
-    curve.push(*last);
+    let mut curve = pieces(last, per_span, at);
+    curve.push(run[last]);
     curve
+}
+
+/// Points of so many spans; `at` gives the control points, from the one before the first span on.
+fn pieces(spans: usize, per_span: usize, at: impl Fn(usize) -> DVec4) -> Vec<DVec4> {
+    let span = |span| {
+        let neighbours = [at(span), at(span + 1), at(span + 2), at(span + 3)];
+        (0..per_span).map(move |piece| span_point(neighbours, piece as f64 / per_span as f64))
+    };
+    (0..spans).flat_map(span).collect()
 }
 
 /// Point of the span from the second to the third of four points, by Barry and Goldman's pyramid.
