@@ -27,28 +27,20 @@ pub(super) enum Layout {
 #[derive(Clone, Debug)]
 pub(super) struct Sheet {
     pub(super) layout: Layout,
-    pub(super) first: Option<TextureUse>,
-    pub(super) second: Option<TextureUse>,
+    pub(super) uses: [Option<TextureUse>; 2],
 }
 
 impl Sheet {
     pub(super) fn is_same(&self, other: &Self) -> bool {
-        let is_same = |pair: [&Option<TextureUse>; 2]| match pair {
-            [Some(one), Some(other)] => {
-                Arc::ptr_eq(&one.texture, &other.texture)
-                    && (one.channels, one.encoding) == (other.channels, other.encoding)
-                    && (one.scale, one.bias) == (other.scale, other.bias)
-            }
-            [None, None] => true,
-            _ => false,
+        let texels = |used: &TextureUse| {
+            (Arc::as_ptr(&used.texture), used.channels, used.encoding, used.scale, used.bias)
         };
-        self.layout == other.layout
-            && is_same([&self.first, &other.first])
-            && is_same([&self.second, &other.second])
+        let all = |sheet: &Self| sheet.uses.each_ref().map(|used| used.as_ref().map(texels));
+        self.layout == other.layout && all(self) == all(other)
     }
 
     fn sources(&self) -> impl Iterator<Item = &TextureUse> {
-        self.first.iter().chain(&self.second)
+        self.uses.iter().flatten()
     }
 
     pub(super) fn name(&self, index: usize) -> String {
@@ -69,7 +61,7 @@ impl Sheet {
     /// Texels, 0 to 1, as the file stores them.
     fn texels(&self) -> Vec<[f32; 4]> {
         let values = |used: &Option<TextureUse>| used.as_ref().map(TextureUse::values);
-        let (first, second) = (values(&self.first), values(&self.second));
+        let [first, second] = self.uses.each_ref().map(values);
         let count = first.as_ref().or(second.as_ref()).map_or(0, Vec::len);
         let color = |values: &Option<Vec<[f32; 4]>>, index: usize| {
             values.as_ref().map_or(Vec3::ONE, |values| Vec3::from_slice(&values[index][..3]))

@@ -50,13 +50,11 @@ impl<'a> Translator<'a> {
             _ => surface.color.as_ref(),
         };
         self.pbr(&core, color);
-        let has_light = surface.emission.is_some() && !is_unlit;
-        if let (Some(emission), true) = (&surface.emission, has_light) {
+        if let Some(emission) = surface.emission.as_ref().filter(|_| !is_unlit) {
             self.emission(emission);
         }
-        if let (Some(used), false) = (&surface.normal, is_unlit) {
-            let sheet = Sheet { layout: Layout::Normal, first: Some(used.clone()), second: None };
-            let mut info = self.texture(sheet, used);
+        let normal = surface.normal.as_ref().filter(|_| !is_unlit);
+        if let Some(mut info) = self.texture(Layout::Normal, [normal, None]) {
             if surface.normal_scale != 1.0 {
                 info["scale"] = json!(surface.normal_scale);
             }
@@ -189,13 +187,12 @@ impl<'a> Translator<'a> {
             "metallicFactor": core.metallic,
             "roughnessFactor": core.roughness,
         });
-        let layout = Layout::ColorOpacity(largest);
         let pair = [color, surface.opacity.texture.as_ref()];
-        if let Some(info) = self.pair(layout, pair, ["colour", "opacity"]) {
+        if let Some(info) = self.texture(Layout::ColorOpacity(largest), pair) {
             pbr["baseColorTexture"] = info;
         }
         let pair = [surface.roughness.as_ref(), surface.metallic.as_ref()];
-        if let Some(info) = self.pair(Layout::RoughnessMetal, pair, ["roughness", "metal"]) {
+        if let Some(info) = self.texture(Layout::RoughnessMetal, pair) {
             pbr["metallicRoughnessTexture"] = info;
         }
         self.members["pbrMetallicRoughness"] = pbr;
@@ -203,40 +200,35 @@ impl<'a> Translator<'a> {
 
     /// Reference to an image of one or two textures. Two must lie in the same way on the surface and
     /// have equally many texels; else the second is left out.
-    fn pair(
+    fn texture(
         &mut self,
         layout: Layout,
         [first, second]: [Option<&TextureUse>; 2],
-        names: [&str; 2],
     ) -> Option<Value> {
         let used = first.or(second)?;
-        let is_alike = |other: &&TextureUse| {
-            let place = |used: &TextureUse| {
-                let sides = (used.texture.width, used.texture.height);
-                (sides, used.uv_set, used.wrap, used.interpolation)
-            };
-            place(used) == place(other) && used.image_from_uv == other.image_from_uv
+        let place = |used: &TextureUse| {
+            let sides = (used.texture.width, used.texture.height);
+            (sides, used.uv_set, used.wrap, used.interpolation, used.image_from_uv)
         };
-        let kept = second.filter(is_alike);
+        let kept = second.filter(|other| place(used) == place(other));
         if second.is_some() && kept.is_none() {
-            let [first, second] = names;
+            let [first, second] = match layout {
+                Layout::RoughnessMetal => ["roughness", "metal"],
+                Layout::ColorOpacity(_) | Layout::Normal => ["colour", "opacity"],
+            };
             self.subject.warn(&format!(
                 "its textures of {first} and {second} lie on the surface in two ways or differ in \
                  size; glTF has one image for both, and that of {second} is left out"
             ));
         }
-        let sheet = Sheet { layout, first: first.cloned(), second: kept.cloned() };
-        Some(self.texture(sheet, used))
-    }
-
-    fn texture(&mut self, sheet: Sheet, used: &TextureUse) -> Value {
+        let sheet = Sheet { layout, uses: [first.cloned(), kept.cloned()] };
         let (info, is_exact) = self.textures.add(sheet, used);
         if !is_exact {
             self.subject.warn(
                 "a texture is sheared on its coordinates, which glTF's transformation cannot",
             );
         }
-        info
+        Some(info)
     }
 
     /// Factors of emission are at most 1 in glTF; an extension multiplies them.
@@ -249,10 +241,8 @@ impl<'a> Translator<'a> {
             let value = json!({"emissiveStrength": strength});
             self.extension("KHR_materials_emissive_strength", value);
         }
-        if let Some(used) = &emission.texture {
-            let layout = Layout::ColorOpacity(largest);
-            let sheet = Sheet { layout, first: Some(used.clone()), second: None };
-            let info = self.texture(sheet, used);
+        let layout = Layout::ColorOpacity(largest);
+        if let Some(info) = self.texture(layout, [emission.texture.as_ref(), None]) {
             self.members["emissiveTexture"] = info;
         }
     }
