@@ -3,7 +3,7 @@
 use bytemuck::NoUninit;
 use sha2::{Digest, Sha256};
 
-use super::{Filter, Scene};
+use super::Scene;
 use crate::{
     Geometry,
     files::hexadecimal,
@@ -64,11 +64,7 @@ struct Hasher(Sha256);
 impl Hasher {
     /// All but the camera.
     fn still(&mut self, scene: &Scene) {
-        let filter = match scene.film.filter {
-            Filter::Box => 0,
-            Filter::Gaussian => 1,
-        };
-        self.array(&[scene.film.width, scene.film.height, filter]);
+        self.array(&[scene.film.width, scene.film.height, scene.film.filter as u32]);
         self.environment(scene);
         self.length(scene.materials.len());
         for material in &scene.materials {

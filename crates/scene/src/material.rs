@@ -227,14 +227,7 @@ impl MaterialKind {
     /// True if no light is sampled at the material, since all of what it sends on comes from one
     /// direction or from behind: paths follow it.
     pub fn is_specular(&self) -> bool {
-        match self {
-            Self::Mirror { .. } | Self::Dielectric { .. } | Self::ThinDielectric { .. } => true,
-            Self::Diffuse { .. }
-            | Self::Plastic { .. }
-            | Self::Conductor { .. }
-            | Self::Principled(_)
-            | Self::Measured { .. } => false,
-        }
+        self.is_glass() || matches!(self, Self::Mirror { .. })
     }
 }
 

@@ -104,10 +104,8 @@ pub(crate) fn srgb_weights(wavelengths_nm: &[f64]) -> Option<Vec<DVec3>> {
             let before = wavelengths_nm[index.saturating_sub(1)];
             let after = wavelengths_nm[(index + 1).min(count - 1)];
             let width = if count == 1 { 1.0 } else { 0.5 * (after - before) };
-            {
-                let row = observer(wavelengths_nm[index]);
-                row.xyz() * row.w * width
-            }
+            let row = observer(wavelengths_nm[index]);
+            row.xyz() * row.w * width
         })
         .collect();
     let luminous: f64 = weighted.iter().map(|xyz| xyz.y).sum();

@@ -217,13 +217,10 @@ impl Shape for Blobs {
             let parts = if ball.carve { &mut field.carved } else { &mut field.added };
             parts.push(ball.part()?);
         }
-        if field.added.is_empty() {
+        let bounds = field.added.iter().map(|part| part.bounds());
+        let Some([low, high]) = bounds.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]) else {
             return Err("balls: all of them carve, expected one to carve from".to_owned());
-        }
-        let [mut low, mut high] = field.added[0].bounds();
-        for [part_low, part_high] in field.added.iter().map(|part| part.bounds()) {
-            (low, high) = (low.min(part_low), high.max(part_high));
-        }
+        };
         // Joined parts swell by no more than this; two more cells keep the surface off the border.
         let swell = blend * (field.added.len() as f64).ln();
         let cell = (high - low + 2.0 * swell).max_element() / cells as f64;
