@@ -120,14 +120,13 @@ fn copied_name(index: usize, path: &Path) -> String {
 
 impl Picture {
     fn bitmap(&self, index: usize) -> Bitmap {
-        let extension = if self.is_stored() { "png" } else { "exr" };
-        let stem = safe_stem(&self.used.texture.name);
-        let is_linear = self.used.encoding == Encoding::Linear
-            || self.used.channels == Channels::Alpha
-            || !self.is_stored();
+        let is_stored = self.is_stored();
+        let extension = if is_stored { "png" } else { "exr" };
         Bitmap {
-            name: format!("t{index:02}_{stem}.{extension}"),
-            is_raw: is_linear,
+            name: format!("t{index:02}_{}.{extension}", safe_stem(&self.used.texture.name)),
+            is_raw: !is_stored
+                || self.used.encoding == Encoding::Linear
+                || self.used.channels == Channels::Alpha,
             is_nearest: self.used.interpolation == Interpolation::Nearest
                 || matches!(self.recipe, Recipe::Cut { .. }),
         }

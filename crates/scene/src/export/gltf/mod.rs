@@ -72,12 +72,8 @@ pub fn export<'a>(scene: &'a Scene, path: &Path) -> Export<'a> {
     Export::new(warnings, move || {
         let (meshes, buffer) = meshes(scene, &parts);
         let mut nodes = nodes.clone();
-        nodes.extend(
-            meshes
-                .iter()
-                .enumerate()
-                .map(|(index, mesh)| json!({"name": mesh["name"], "mesh": index})),
-        );
+        let placed = meshes.iter().enumerate();
+        nodes.extend(placed.map(|(index, mesh)| json!({"name": mesh["name"], "mesh": index})));
         let uri_of = |name: &str| format!("{}/{name}", utf8_percent_encode(&folder.name, IN_URI));
         let version = env!("CARGO_PKG_VERSION");
         let mut document = json!({
@@ -125,14 +121,8 @@ fn meshes(scene: &Scene, parts: &[Parts]) -> (Vec<Value>, Buffer) {
         let sets = surface.textures().map(|used| used.uv_set as usize + 1);
         let uv_sets = sets.max().unwrap_or(0);
         for (part, is_flat) in parts.each() {
-            let framed;
-            let part = match &surface.normal {
-                Some(used) => {
-                    framed = part.with_frames(used);
-                    &framed
-                }
-                None => part,
-            };
+            let framed = surface.normal.as_ref().map(|used| part.with_frames(used));
+            let part = framed.as_ref().unwrap_or(part);
             let attributes = Attributes {
                 normals: !is_flat || surface.normal.is_some(),
                 tangents: surface.normal.is_some(),
