@@ -151,22 +151,11 @@ impl Hasher {
     }
 
     fn surface(&mut self, surface: &Surface) {
-        let emission = surface.emission.as_ref();
-        let uses = [
-            &surface.color,
-            &surface.roughness,
-            &surface.metallic,
-            &surface.normal,
-            &surface.opacity.texture,
-            emission.map_or(&None, |emission| &emission.texture),
-        ];
-        for texture in uses {
-            self.texture(texture.as_ref());
-        }
+        surface.uses().into_iter().for_each(|used| self.texture(used));
         let cutoff = surface.opacity.cutoff.unwrap_or(-1.0);
         self.array(&[surface.normal_scale, surface.opacity.factor, cutoff]);
         self.array(&[u32::from(surface.vertex_color), u32::from(surface.two_sided)]);
-        if let Some(emission) = emission {
+        if let Some(emission) = &surface.emission {
             self.array(&[emission.radiance]);
             self.array(&[u32::from(emission.two_sided)]);
         }

@@ -79,13 +79,16 @@ impl Default for Surface {
 }
 
 impl Surface {
+    /// Uses of textures by colour, roughness, metallic share, normals, opacity and emission.
+    pub(crate) fn uses(&self) -> [Option<&TextureUse>; 6] {
+        let Self { color, roughness, metallic, normal, opacity, emission, .. } = self;
+        let emission = emission.as_ref().map_or(&None, |emission| &emission.texture);
+        [color, roughness, metallic, normal, &opacity.texture, emission].map(Option::as_ref)
+    }
+
     /// Every use of a texture.
     pub fn textures(&self) -> impl Iterator<Item = &TextureUse> {
-        let emission = self.emission.as_ref().and_then(|emission| emission.texture.as_ref());
-        [&self.color, &self.roughness, &self.metallic, &self.normal, &self.opacity.texture]
-            .into_iter()
-            .filter_map(Option::as_ref)
-            .chain(emission)
+        self.uses().into_iter().flatten()
     }
 }
 
