@@ -79,10 +79,11 @@ fn span_point(points: [DVec4; 4], parameter: f64) -> DVec4 {
     mix(mix(ab, bc, 0, 2), mix(bc, cd, 1, 3), 1, 2)
 }
 
-/// Stretch of an outline without sharp corners: its point indices, with the unit normal at each.
-pub(super) type Chain = Vec<(usize, DVec2)>;
+/// Stretch of an outline without sharp corners: its point indices, with the unit normal at each and the
+/// length of the outline up to there.
+pub(super) type Chain = Vec<(usize, DVec2, f64)>;
 
-/// Cuts a polyline at corners sharper than `crease_deg` into chains of point index and normal.
+/// Cuts a polyline at corners sharper than `crease_deg` into chains.
 ///
 /// Normals point to the right of the direction of travel and are averaged at soft corners. `ends`
 /// holds the normals beyond the first and the last segment, if any.
@@ -105,6 +106,7 @@ pub(super) fn chains(
     let first = if closed { (0..count).find(|&corner| sharp(corner)).unwrap_or(0) } else { 0 };
     let mut chains = Vec::new();
     let mut chain: Chain = Vec::new();
+    let mut length = 0.0;
     for step in 0..segment_count {
         let segment = first + step;
         let own = normal(segment);
@@ -118,10 +120,12 @@ pub(super) fn chains(
         };
         if chain.is_empty() {
             let start = before.filter(|&before| soft(before, own)).map_or(own, |b| mean(b, own));
-            chain.push((segment % count, start));
+            chain.push((segment % count, start, length));
         }
+        length += points[segment % count].distance(points[(segment + 1) % count]);
         let soft_after = after.filter(|&after| soft(own, after));
-        chain.push(((segment + 1) % count, soft_after.map_or(own, |after| mean(own, after))));
+        let end = soft_after.map_or(own, |after| mean(own, after));
+        chain.push(((segment + 1) % count, end, length));
         if soft_after.is_none() {
             chains.push(std::mem::take(&mut chain));
         }

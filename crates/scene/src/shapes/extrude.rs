@@ -75,22 +75,15 @@ impl Shape for Extrude {
             rings.push((outline, -depth, -angle));
         }
         let mut builder = Builder::default();
-        let side = |index: usize| outline[index].distance(outline[(index + 1) % outline.len()]);
-        let mut along = 0.0;
         for chain in curve::chains(&outline, true, crease_deg, [None, None]) {
-            let mut lengths = vec![along];
-            for &(index, _) in &chain[..chain.len() - 1] {
-                along += side(index);
-                lengths.push(along);
-            }
             // Outline counter-clockwise, rings toward +z: columns × rows points outward.
             builder.patch(rings.len(), chain.len(), |row, column| {
                 let (ring, depth, angle) = &rings[row];
-                let (index, normal) = chain[column];
+                let (index, normal, along) = chain[column];
                 Vertex {
                     position: ring[index].extend(*depth),
                     normal: (angle.cos() * normal).extend(angle.sin()),
-                    uv: DVec2::new(lengths[column], half_depth + depth),
+                    uv: DVec2::new(along, half_depth + depth),
                 }
             });
         }

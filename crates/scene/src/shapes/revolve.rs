@@ -233,18 +233,12 @@ fn revolve(
         })
         .collect();
     let mut builder = Builder::default();
-    let mut along = 0.0;
     for chain in curve::chains(profile, closed, crease_deg, ends) {
-        let mut lengths = vec![along];
-        for pair in chain.windows(2) {
-            along += profile[pair[0].0].distance(profile[pair[1].0]);
-            lengths.push(along);
-        }
         builder.patch(chain.len(), turns.len(), |row, column| {
-            let (point, normal) = (profile[chain[row].0], chain[row].1);
+            let (index, normal, along) = chain[row];
             let turn = |vector: DVec2| vector.x * turns[column] + vector.y * DVec3::Y;
-            let uv = DVec2::new(column as f64 / segments as f64, lengths[row]);
-            Vertex { position: turn(point), normal: turn(normal), uv }
+            let uv = DVec2::new(column as f64 / segments as f64, along);
+            Vertex { position: turn(profile[index]), normal: turn(normal), uv }
         });
     }
     builder.finish()
