@@ -231,12 +231,9 @@ impl KindTable<'_> {
 
 fn read_table<T: DeserializeOwned>(table: DeTable, span: Range<usize>) -> Result<T, TextError> {
     let deserializer = ValueDeserializer::from(Spanned::new(span.clone(), DeValue::Table(table)));
-    T::deserialize(deserializer).map_err(|error| {
-        let mut failure = TextError::from(error.clone());
-        if error.span().is_none() {
-            failure.span = span;
-        }
-        failure
+    T::deserialize(deserializer).map_err(|error| TextError {
+        span: error.span().unwrap_or(span),
+        message: error.message().to_owned(),
     })
 }
 

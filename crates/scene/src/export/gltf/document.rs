@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeSet, path::Path};
 
+use glam::{Vec3, Vec4};
 use serde_json::{Value, json};
 
 use super::images::Sheet;
@@ -12,6 +13,8 @@ use crate::{
         parts::{Part, Vertex},
         ply::SAME_UV,
     },
+    instance::bounds,
+    material::Surface,
     texture::{Interpolation, TextureUse, Wrap},
 };
 
@@ -107,43 +110,34 @@ pub(super) struct Buffer {
     pub(super) accessors: Vec<Value>,
 }
 
-/// Attributes of the vertices of a primitive beside their positions.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Attributes {
-    pub(super) normals: bool,
-    pub(super) tangents: bool,
-    /// Sets of texture coordinates.
-    pub(super) uv_sets: usize,
-    pub(super) colors: bool,
-}
-
 impl Buffer {
-    /// Adds the triangles of a part and returns a primitive without material.
-    pub(super) fn primitive(&mut self, part: &Part, attributes: Attributes) -> Value {
-        let vertices = &part.vertices;
-        let positions = vertices.iter().map(|vertex| vertex.position);
-        let low = positions.clone().reduce(glam::Vec3::min).unwrap_or_default().to_array();
-        let high = positions.reduce(glam::Vec3::max).unwrap_or_default().to_array();
+    /// Adds the triangles of a part, with what `surface` reads of its vertices, and returns a primitive
+    /// without material.
+    pub(super) fn primitive(&mut self, part: &Part, is_flat: bool, surface: &Surface) -> Value {
+        let (vertices, has_frames) = (&part.vertices, surface.normal.is_some());
+        let around = bounds(vertices.iter().map(|vertex| vertex.position)).unwrap_or_default();
         let index = self.vectors(vertices, |vertex| vertex.position.to_array());
-        self.accessors[index]["min"] = json!(low);
-        self.accessors[index]["max"] = json!(high);
+        for (name, corner) in ["min", "max"].into_iter().zip(around) {
+            self.accessors[index][name] = json!(corner.to_array());
+        }
         let mut members = json!({"POSITION": index});
-        if attributes.normals {
+        if !is_flat || has_frames {
             let normal = |vertex: &Vertex| vertex.normal.normalize_or_zero().to_array();
             members["NORMAL"] = self.vectors(vertices, normal).into();
         }
-        if attributes.tangents {
+        if has_frames {
             let tangent = |vertex: &Vertex| {
-                let along = vertex.tangent.truncate().normalize_or(glam::Vec3::X);
+                let along = vertex.tangent.truncate().normalize_or(Vec3::X);
                 along.extend(if vertex.tangent.w < 0.0 { -1.0 } else { 1.0 }).to_array()
             };
             members["TANGENT"] = self.vectors(vertices, tangent).into();
         }
-        for set in 0..attributes.uv_sets {
+        let uv_sets = surface.textures().map(|used| used.uv_set as usize + 1).max().unwrap_or(0);
+        for set in 0..uv_sets {
             let index = self.vectors(vertices, |vertex| vertex.uvs[set].to_array());
             members[format!("TEXCOORD_{set}")] = index.into();
         }
-        if attributes.colors {
+        if surface.vertex_color && vertices.iter().any(|vertex| vertex.color != Vec4::ONE) {
             members["COLOR_0"] = self.vectors(vertices, |vertex| vertex.color.to_array()).into();
         }
         let start = self.bytes.len();

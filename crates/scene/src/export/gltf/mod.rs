@@ -19,7 +19,7 @@ use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Value, json};
 
 use self::{
-    document::{Attributes, Buffer, Textures},
+    document::{Buffer, Textures},
     materials::Translator,
 };
 use super::{
@@ -118,19 +118,10 @@ fn meshes(scene: &Scene, parts: &[Parts]) -> (Vec<Value>, Buffer) {
     for (index, parts) in parts.iter().enumerate() {
         let material = &scene.materials[index];
         let surface = &material.surface;
-        let sets = surface.textures().map(|used| used.uv_set as usize + 1);
-        let uv_sets = sets.max().unwrap_or(0);
         for (part, is_flat) in parts.each() {
             let framed = surface.normal.as_ref().map(|used| part.with_frames(used));
             let part = framed.as_ref().unwrap_or(part);
-            let attributes = Attributes {
-                normals: !is_flat || surface.normal.is_some(),
-                tangents: surface.normal.is_some(),
-                uv_sets,
-                colors: surface.vertex_color
-                    && part.vertices.iter().any(|vertex| vertex.color != glam::Vec4::ONE),
-            };
-            let mut primitive = buffer.primitive(part, attributes);
+            let mut primitive = buffer.primitive(part, is_flat, surface);
             primitive["material"] = index.into();
             let name = identifier(index, &material.name);
             meshes.push(json!({"name": name, "primitives": [primitive]}));
