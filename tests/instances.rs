@@ -103,7 +103,7 @@ fn check_host(name: &str, accel: &Accel, rays: &[Ray]) {
 /// Compares the two-level tree with the tree over the flattened scene, and the host on the first `free` rays,
 /// which aim at no edge. Returns the share of hits whose distance is the same to the bit.
 fn check(name: &str, geometry: &Geometry, rays: &[Ray], free: usize, tolerance: f32) -> f64 {
-    let flat = geometry.flattened().unwrap();
+    let flat = geometry.clone().flattened().unwrap();
     let two_levels = Accel::build(geometry, ONE_PAGE).unwrap();
     let one_level = Accel::build(&flat, ONE_PAGE).unwrap();
     assert!(two_levels.is_instanced() && !one_level.is_instanced());
@@ -174,7 +174,7 @@ fn check(name: &str, geometry: &Geometry, rays: &[Ray], free: usize, tolerance: 
 fn two_levels_find_what_one_level_finds() {
     for (count, seed) in [(1, 1), (2, 2), (40, 3), (400, 4)] {
         let geometry = scene(count, 10 * seed, 2.0, 4.0, false);
-        let flat = geometry.flattened().unwrap();
+        let flat = geometry.clone().flattened().unwrap();
         let mut rays = random_rays(1500, seed, 6.0);
         rays.extend(aimed_rays(&flat, 1500, seed, 6.0));
         let same = check(&format!("{count} instances"), &geometry, &rays, 1500, 1e-5);
@@ -188,7 +188,7 @@ fn mirrors_and_extreme_transforms_lose_no_triangle() {
     for (scale, spread, tolerance) in [(4.0, 4.0, 2e-5), (100.0, 50.0, 1e-3), (10.0, 1000.0, 1e-3)]
     {
         let geometry = scene(60, 77, scale, spread, true);
-        let flat = geometry.flattened().unwrap();
+        let flat = geometry.clone().flattened().unwrap();
         let mut rays = random_rays(1500, 5, 1.5 * spread);
         rays.extend(aimed_rays(&flat, 3000, 6, 1.5 * spread));
         check(&format!("scale {scale} at {spread} m"), &geometry, &rays, 1500, tolerance);
@@ -198,7 +198,7 @@ fn mirrors_and_extreme_transforms_lose_no_triangle() {
 #[test]
 fn shadow_rays_are_blocked_by_instances() {
     let geometry = scene(60, 31, 2.0, 3.0, true);
-    let flat = geometry.flattened().unwrap();
+    let flat = geometry.clone().flattened().unwrap();
     let mut random = Random(8);
     // Hits in space without a surface: their rays start where they are, but for the offset.
     let hits: Vec<Hit> = (0..500)
@@ -413,7 +413,7 @@ fn repeated_meshes_become_instances_that_look_like_copies() {
     assert!(geometry.prototypes[0].triangles.len() * 4 < PLACED_TRIANGLES);
 
     let mut flat = load(None);
-    flat.geometry = geometry.flattened().unwrap();
+    flat.geometry = geometry.clone().flattened().unwrap();
     // A mesh that is used once is placed by other code.
     let alone = load(Some(1)).geometry;
     let own = geometry.prototypes[0].positions.len();
@@ -519,7 +519,7 @@ fn bumps_keep_their_side_in_mirrors_and_from_behind() {
     };
     let settings = Settings { shadow_rays: 0, aovs: vec![Aov::Normal], ..Settings::default() };
     // The same scene placed flat has the same bumps.
-    for geometry in [geometry.clone(), geometry.flattened().unwrap()] {
+    for geometry in [geometry.clone(), geometry.clone().flattened().unwrap()] {
         scene.geometry = geometry;
         let (sums, _) = support::render(&scene, settings.clone(), 1);
         for (pixel, normal) in sums.normal.iter().enumerate() {

@@ -94,26 +94,18 @@ impl Geometry {
 
     /// The same scene with every instance placed: for exports, and for comparison. None if 32-bit
     /// indices cannot address the vertices.
-    pub fn flattened(&self) -> Option<Self> {
+    pub fn flattened(mut self) -> Option<Self> {
         let of = |instance: &Instance| {
             self.prototypes[instance.prototype as usize].positions.len() as u64
         };
         let vertices = self.positions.len() as u64 + self.instances.iter().map(of).sum::<u64>();
         u32::try_from(vertices.max(self.triangle_count())).ok()?;
-        let mut flat = Self {
-            positions: self.positions.clone(),
-            normals: self.normals.clone(),
-            uvs: self.uvs.clone(),
-            tangents: self.tangents.clone(),
-            colors: self.colors.clone(),
-            triangles: self.triangles.clone(),
-            materials: self.materials.clone(),
-            ..Self::default()
-        };
-        for instance in &self.instances {
-            flat.place_instance(instance, &self.prototypes[instance.prototype as usize]);
+        self.objects.clear();
+        let prototypes = std::mem::take(&mut self.prototypes);
+        for instance in std::mem::take(&mut self.instances) {
+            self.place_instance(&instance, &prototypes[instance.prototype as usize]);
         }
-        Some(flat)
+        Some(self)
     }
 
     /// Adds the triangles of an instance of `mesh` in the world.

@@ -60,7 +60,7 @@ fn write_ply(folder: &Folder) {
 
 /// Corners of the triangles of the last uses, in the order of the file.
 fn last_triangles(scene: &Scene, uses: usize) -> Vec<[Vec3; 3]> {
-    let flat = scene.geometry.flattened().unwrap();
+    let flat = scene.geometry.clone().flattened().unwrap();
     let corner = |index: u32| Vec3::from(flat.positions[index as usize]);
     let last = &flat.triangles[flat.triangles.len() - uses * TRIANGLES..];
     last.iter().map(|triangle| triangle.map(corner)).collect()
@@ -81,7 +81,7 @@ fn compare_scenes(few: &Scene, many: &Scene, instances: usize) {
             assert!(error < 1e-4, "a corner at {found} instead of {expected}");
         }
     }
-    let (few, many) = (&few.geometry, many.geometry.flattened().unwrap());
+    let (few, many) = (&few.geometry, many.geometry.clone().flattened().unwrap());
     assert_eq!(few.materials[0], many.materials[0]);
 }
 
