@@ -44,6 +44,13 @@ impl Bound {
     fn room(&self) -> u64 {
         self.limit.saturating_sub(self.in_use)
     }
+
+    fn check(self, asker: impl fmt::Display, asked: u64) -> Result<(), Shortage> {
+        if asked <= self.room() {
+            return Ok(());
+        }
+        Err(Shortage { asker: asker.to_string(), asked, bound: self })
+    }
 }
 
 impl fmt::Display for Shortage {
@@ -115,14 +122,8 @@ fn tightest_bound() -> Bound {
 /// A limit (`ulimit -v`) leaves less than 1.5 GiB.
 pub fn check_driver() -> Result<(), Shortage> {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    match address_space(&status) {
-        Some(bound) if bound.room() < DRIVER_ADDRESS_SPACE => Err(Shortage {
-            asker: "the Vulkan driver".to_owned(),
-            asked: DRIVER_ADDRESS_SPACE,
-            bound,
-        }),
-        _ => Ok(()),
-    }
+    let bound = address_space(&status);
+    bound.map_or(Ok(()), |bound| bound.check("the Vulkan driver", DRIVER_ADDRESS_SPACE))
 }
 
 /// Returns the limit of the address space, if there is one; `status` is that of the process.
@@ -138,14 +139,7 @@ fn address_space(status: &str) -> Option<Bound> {
 /// # Errors
 /// The request does not fit.
 pub fn check(asker: impl fmt::Display, bytes: u64) -> Result<(), Shortage> {
-    if bytes < SMALL_BYTES {
-        return Ok(());
-    }
-    let bound = tightest_bound();
-    if bytes <= bound.room() {
-        return Ok(());
-    }
-    Err(Shortage { asker: asker.to_string(), asked: bytes, bound })
+    if bytes < SMALL_BYTES { Ok(()) } else { tightest_bound().check(asker, bytes) }
 }
 
 /// As [`check`], for `count` elements of `size` bytes.

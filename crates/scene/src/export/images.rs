@@ -205,27 +205,22 @@ impl Picture {
     }
 
     /// Function from values of the texture to those of the image.
-    fn value(&self) -> Box<dyn Fn(Vec3) -> Vec3 + Sync> {
-        match self.recipe {
-            Recipe::Color(factor) | Recipe::Radiance(factor) => {
-                Box::new(move |value| value * factor)
-            }
-            Recipe::Base(factor, ior) => {
-                let base = base_below_coat(ior);
-                Box::new(move |value| (value * factor).map(&base))
-            }
-            Recipe::Number(factor) => Box::new(move |value| Vec3::splat(factor * luminance(value))),
-            Recipe::Squared(factor) => {
-                Box::new(move |value| Vec3::splat(factor * luminance(value).powi(2)))
-            }
+    fn value(&self) -> impl Fn(Vec3) -> Vec3 + Sync {
+        let recipe = self.recipe;
+        let base = base_below_coat(if let Recipe::Base(_, ior) = recipe { ior } else { 1.0 });
+        move |value| match recipe {
+            Recipe::Color(factor) | Recipe::Radiance(factor) => value * factor,
+            Recipe::Base(factor, _) => (value * factor).map(&base),
+            Recipe::Number(factor) => Vec3::splat(factor * luminance(value)),
+            Recipe::Squared(factor) => Vec3::splat(factor * luminance(value).powi(2)),
             Recipe::Normal(factor) => {
                 // The length of a normal does not count. Texels stay within 0…1.
                 let factor = factor.extend(1.0) / factor.abs().max_element().max(1.0);
-                Box::new(move |value| 0.5 + 0.5 * factor * (2.0 * value - 1.0))
+                0.5 + 0.5 * factor * (2.0 * value - 1.0)
             }
-            Recipe::Cut { factor, cutoff } => Box::new(move |value| {
+            Recipe::Cut { factor, cutoff } => {
                 Vec3::splat(if factor * luminance(value) >= cutoff { 1.0 } else { 0.0 })
-            }),
+            }
         }
     }
 }

@@ -78,12 +78,8 @@ impl<'a> Translator<'a> {
         let surface = self.subject.surface;
         let is_black =
             matches!(self.subject.material.kind, MaterialKind::Diffuse { reflectance: Vec3::ZERO });
-        is_black
-            && surface
-                .emission
-                .as_ref()
-                .is_some_and(|light| light.two_sided && light.radiance.max_element() <= 1.0)
-            && !surface.vertex_color
+        let is_shown = |light: &Emission| light.two_sided && light.radiance.max_element() <= 1.0;
+        is_black && surface.emission.as_ref().is_some_and(is_shown) && !surface.vertex_color
     }
 
     /// Factors of the model, with the extensions that it needs.
