@@ -1,6 +1,6 @@
 //! Meshes that are in memory once and in the scene many times.
 
-use glam::{DAffine3, DMat3, DVec3, Vec3, Vec4};
+use glam::{DAffine3, DMat4, DVec4, Vec3, Vec4};
 
 use super::transform::Transform;
 
@@ -68,10 +68,8 @@ impl Instance {
 
     /// The same instance with another affine map from the space of the mesh to the world.
     fn placed(self, map: DAffine3) -> Option<Self> {
-        let [x, y, z] = map.matrix3.transpose().to_cols_array_2d().map(DVec3::from);
-        let row = |row: DVec3, shift: f64| row.extend(shift).as_vec4();
-        let shift = map.translation;
-        let world_from_object = [row(x, shift.x), row(y, shift.y), row(z, shift.z)];
+        let rows = DMat4::from(map).transpose();
+        let world_from_object = [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.as_vec4());
         let placed = Self { world_from_object, ..self };
         placed.object_from_world().map(|_| placed)
     }
@@ -79,8 +77,7 @@ impl Instance {
     /// Affine map from the space of the mesh to the world.
     pub fn affine(&self) -> DAffine3 {
         let [x, y, z] = self.world_from_object.map(|row| row.as_dvec4());
-        let linear = DMat3::from_cols(x.truncate(), y.truncate(), z.truncate()).transpose();
-        DAffine3 { matrix3: linear, translation: DVec3::new(x.w, y.w, z.w) }
+        DAffine3::from_mat4(DMat4::from_cols(x, y, z, DVec4::W).transpose())
     }
 
     /// Inverse of [`Instance::affine`]; none if it is not finite, or either of the two is extreme.
@@ -121,8 +118,7 @@ impl Instance {
 }
 
 fn affine(transform: &Transform) -> DAffine3 {
-    let (matrix3, translation) = (transform.linear.as_dmat3(), transform.translate.as_dvec3());
-    DAffine3 { matrix3, translation }
+    DAffine3::from_mat3_translation(transform.linear.as_dmat3(), transform.translate.as_dvec3())
 }
 
 /// Box around positions; none without any.
