@@ -55,8 +55,7 @@ pub(super) struct Triangles {
 pub(super) fn divide(scene: &Scene) -> Vec<Parts> {
     let Geometry { triangles, materials, .. } = &scene.geometry;
     let mut all = vec![Parts::default(); scene.materials.len()];
-    let mut places: Vec<[HashMap<u32, u32>; 2]> = Vec::new();
-    places.resize_with(all.len(), Default::default);
+    let mut places = vec![[HashMap::new(), HashMap::new()]; all.len()];
     for (triangle, &material) in triangles.iter().zip(materials) {
         let corners = triangle.map(|at| vertex(&scene.geometry, at as usize));
         let is_flat = corners.iter().any(|corner| corner.normal == Vec3::ZERO);
@@ -118,33 +117,29 @@ impl Part {
     /// Gives each vertex the normal of its triangle, and the tangent that this has by the coordinates of
     /// a normal map, unless it has its own. Vertices are repeated where triangles differ.
     pub(super) fn with_frames(&self, used: &TextureUse) -> Self {
-        let mut own = self.clone();
-        for triangle in &mut own.triangles {
+        let mut places = vec![None; self.vertices.len()];
+        let (mut vertices, mut triangles) = (Vec::new(), self.triangles.clone());
+        let mut add = |vertex: Vertex| {
+            vertices.push(vertex);
+            vertices.len() as u32 - 1
+        };
+        for triangle in &mut triangles {
             let corners = triangle.map(|at| self.vertices[at as usize]);
-            let is_framed = |corner: &Vertex| {
+            let is_framed = corners.iter().all(|corner| {
                 corner.normal != Vec3::ZERO && corner.tangent.truncate() != Vec3::ZERO
-            };
-            if corners.iter().all(is_framed) {
-                continue;
-            }
+            });
             let (flat, along) = (face(corners).normalize_or_zero(), tangent(corners, used));
             let is_flat = corners.iter().any(|corner| corner.normal == Vec3::ZERO);
             for (corner, index) in corners.iter().zip(triangle) {
-                let normal = if is_flat { flat } else { corner.normal };
-                *index = own.vertices.len() as u32;
-                own.vertices.push(Vertex { normal, tangent: along, ..*corner });
+                *index = if is_framed {
+                    *places[*index as usize].get_or_insert_with(|| add(*corner))
+                } else {
+                    let normal = if is_flat { flat } else { corner.normal };
+                    add(Vertex { normal, tangent: along, ..*corner })
+                };
             }
         }
-        // Leave out the vertices that no triangle uses any more.
-        let mut places = vec![None; own.vertices.len()];
-        let mut vertices = Vec::with_capacity(own.vertices.len());
-        for index in own.triangles.iter_mut().flatten() {
-            *index = *places[*index as usize].get_or_insert_with(|| {
-                vertices.push(own.vertices[*index as usize]);
-                vertices.len() as u32 - 1
-            });
-        }
-        Self { vertices, ..own }
+        Self { vertices, triangles }
     }
 
     /// The same triangles seen from behind, so far behind their front, metres.
