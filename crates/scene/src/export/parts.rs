@@ -6,6 +6,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use crate::{
     Geometry, Scene, instance,
+    material::Surface,
     texture::{TextureUse, lookup::gradient_tangent},
 };
 
@@ -39,9 +40,9 @@ pub(super) struct Parts([Part; 2]);
 /// Facts about the triangles of a material that its translation depends on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Triangles {
-    /// Some vertices have colours.
+    /// Some vertices have colours that the surface shows.
     pub(super) has_colors: bool,
-    /// Some vertices are not opaque.
+    /// Some vertices have opacities that the surface shows and that are not 1.
     pub(super) has_transparency: bool,
     /// Some vertices have tangents.
     pub(super) has_tangents: bool,
@@ -90,18 +91,18 @@ impl Parts {
         self.0.iter().zip([false, true]).filter(|(part, _)| !part.triangles.is_empty())
     }
 
-    /// Collects the facts; `normal` is the normal map of the material.
-    pub(super) fn describe(&self, normal: Option<&TextureUse>) -> Triangles {
+    /// Collects the facts about triangles of a surface.
+    pub(super) fn describe(&self, surface: &Surface) -> Triangles {
         let mut facts = Triangles::default();
         for (part, is_flat) in self.each() {
             for vertex in &part.vertices {
-                facts.has_colors |= vertex.color != Vec4::ONE;
-                facts.has_transparency |= vertex.color.w < 1.0;
+                facts.has_colors |= surface.vertex_color && vertex.color != Vec4::ONE;
+                facts.has_transparency |= surface.vertex_color && vertex.color.w < 1.0;
                 facts.has_tangents |= vertex.tangent.truncate() != Vec3::ZERO;
             }
             for &triangle in &part.triangles {
                 let corners = triangle.map(|at| part.vertices[at as usize]);
-                if let Some(used) = normal {
+                if let Some(used) = &surface.normal {
                     let sign = tangent(corners, used).w;
                     facts.bitangents[usize::from(sign < 0.0)] += usize::from(sign != 0.0);
                 }

@@ -30,17 +30,14 @@ pub(super) fn write(
     attributes: Attributes,
 ) -> io::Result<()> {
     let Attributes { uvs: written, color_factor } = attributes;
-    let mut properties = String::new();
-    for (is_there, names) in [
-        (true, &["x", "y", "z"][..]),
-        (!is_flat, &["nx", "ny", "nz"]),
-        (written.is_some(), &["u", "v"]),
-        (color_factor.is_some(), &["r", "g", "b"]),
-    ] {
-        for name in names.iter().filter(|_| is_there) {
-            properties += &format!("property float {name}\n");
-        }
-    }
+    let groups = [
+        ("x y z", true),
+        ("nx ny nz", !is_flat),
+        ("u v", written.is_some()),
+        ("r g b", color_factor.is_some()),
+    ];
+    let names = groups.into_iter().filter(|group| group.1).flat_map(|group| group.0.split(' '));
+    let properties: String = names.map(|name| format!("property float {name}\n")).collect();
     write!(
         file,
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\n{properties}element face \

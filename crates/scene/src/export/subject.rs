@@ -41,8 +41,7 @@ impl<'a> Subject<'a> {
         warnings: &'a mut Vec<String>,
     ) -> Self {
         let surface = &material.surface;
-        let triangles = parts.describe(surface.normal.as_ref());
-        Self { program, material, surface, triangles, warnings }
+        Self { program, material, surface, triangles: parts.describe(surface), warnings }
     }
 
     pub(super) fn warn(&mut self, difference: &str) {
@@ -51,7 +50,7 @@ impl<'a> Subject<'a> {
 
     /// Names colours that a model of `kind` has no place for.
     pub(super) fn without_color(&mut self, kind: &str) {
-        if self.surface.color.is_some() || self.surface.vertex_color && self.triangles.has_colors {
+        if self.surface.color.is_some() || self.triangles.has_colors {
             self.warn(&format!(
                 "the colours of its surface or its vertices have no place in a {kind}"
             ));

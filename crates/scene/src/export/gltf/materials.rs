@@ -244,9 +244,8 @@ impl<'a> Translator<'a> {
     }
 
     fn opacity(&mut self) {
-        let surface = self.subject.surface;
-        let opacity = &surface.opacity;
-        let has_colors = surface.vertex_color && self.subject.triangles.has_transparency;
+        let opacity = &self.subject.surface.opacity;
+        let has_colors = self.subject.triangles.has_transparency;
         if let Some(cutoff) = opacity.cutoff {
             self.members["alphaMode"] = "MASK".into();
             self.members["alphaCutoff"] = json!(cutoff);

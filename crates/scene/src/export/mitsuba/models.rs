@@ -215,7 +215,7 @@ impl Translator<'_> {
     /// Main colour of the model, with its texture or the colours of vertices.
     fn color(&mut self, name: &str, factor: Vec3) -> String {
         let surface = self.subject.surface;
-        let is_of_vertices = surface.vertex_color && self.subject.triangles.has_colors;
+        let is_of_vertices = self.subject.triangles.has_colors;
         if let Some(used) = &surface.color {
             if is_of_vertices {
                 self.subject.warn(
@@ -299,7 +299,7 @@ impl Translator<'_> {
 
     /// Parameter of a `mask`, for a surface that is not opaque.
     fn opacity(&mut self) -> Option<String> {
-        if self.subject.surface.vertex_color && self.subject.triangles.has_transparency {
+        if self.subject.triangles.has_transparency {
             self.subject.warn("the opacity of its vertices is left out");
         }
         Some(match self.subject.opacity("mask")? {

@@ -56,7 +56,7 @@ impl<'a> Translator<'a> {
         if surface.textures().any(|used| Some(used.uv_set) != self.base.map(|base| base.uv_set)) {
             self.subject.warn("its textures read two sets of coordinates, pbrt's only one of them");
         }
-        if surface.vertex_color && self.subject.triangles.has_colors {
+        if self.subject.triangles.has_colors {
             self.subject
                 .warn("pbrt has no colours of vertices; theirs and their opacity are left out");
         }
