@@ -273,7 +273,8 @@ impl Image {
             .iter()
             .map(|(name, samples)| {
                 assert_eq!(samples.len(), self.pixel_count(), "samples of channel {name}");
-                AnyChannel::new(text(name), BorrowedSamples(samples))
+                let width = self.width as usize;
+                AnyChannel::new(text(name), BorrowedSamples { samples, width })
             })
             .collect();
         let mut attributes = LayerAttributes {
@@ -447,16 +448,14 @@ fn write_file<'a, L: WritableLayers<'a>>(
 }
 
 /// Samples of a channel, borrowed so that large films are not copied.
-struct BorrowedSamples<'a>(&'a [f32]);
-
-/// Passes rows of [`BorrowedSamples`] to the encoder.
-struct BorrowedWriter<'a> {
+#[derive(Clone, Copy)]
+struct BorrowedSamples<'a> {
     samples: &'a [f32],
     width: usize,
 }
 
 impl<'a> WritableSamples<'a> for BorrowedSamples<'_> {
-    type Writer = BorrowedWriter<'a>;
+    type Writer = BorrowedSamples<'a>;
 
     fn sample_type(&self) -> SampleType {
         SampleType::F32
@@ -466,12 +465,12 @@ impl<'a> WritableSamples<'a> for BorrowedSamples<'_> {
         (LevelMode::Singular, RoundingMode::Down)
     }
 
-    fn create_samples_writer(&'a self, header: &Header) -> Self::Writer {
-        BorrowedWriter { samples: self.0, width: header.layer_size.width() }
+    fn create_samples_writer(&'a self, _: &Header) -> Self::Writer {
+        *self
     }
 }
 
-impl SamplesWriter for BorrowedWriter<'_> {
+impl SamplesWriter for BorrowedSamples<'_> {
     fn extract_line(&self, line: LineRefMut<'_>) {
         let start = line.location.position.y() * self.width + line.location.position.x();
         let end = start + line.location.sample_count;
