@@ -42,14 +42,15 @@ pub fn dimensions(header: [u8; HEADER_BYTES]) -> [i32; 3] {
 /// also invalid and counted in the table's warnings.
 pub fn load(path: &Path) -> Result<MeasuredTable> {
     let io_error = |source| Error::io(path, "read", source);
-    let mut file = files::open_regular(path)?;
-    let found_bytes = file.metadata().map_err(io_error)?.len();
-    let mut header = [0; HEADER_BYTES];
-    if found_bytes < HEADER_BYTES as u64 {
+    let file = files::open_regular(path)?;
+    let stated_bytes = file.metadata().map_err(io_error)?.len();
+    let mut bytes = Vec::new();
+    file.take(FILE_BYTES as u64).read_to_end(&mut bytes).map_err(io_error)?;
+    let found_bytes = if bytes.len() < FILE_BYTES { bytes.len() as u64 } else { stated_bytes };
+    let Some((header, values)) = bytes.split_first_chunk() else {
         return Err(wrong_size(path, found_bytes));
-    }
-    file.read_exact(&mut header).map_err(io_error)?;
-    let [theta_half, theta_difference, phi] = dimensions(header);
+    };
+    let [theta_half, theta_difference, phi] = dimensions(*header);
     if [theta_half, theta_difference, phi] != EXPECTED_DIMENSIONS {
         let [expected_half, expected_difference, expected_phi] = EXPECTED_DIMENSIONS;
         return Err(Error::format(
@@ -64,17 +65,8 @@ pub fn load(path: &Path) -> Result<MeasuredTable> {
     if found_bytes != FILE_BYTES as u64 {
         return Err(wrong_size(path, found_bytes));
     }
-    let mut bytes = Vec::new();
-    bytes.try_reserve_exact(FILE_BYTES - HEADER_BYTES).map_err(|_| {
-        Error::format(path, format!("not enough memory for the {FILE_BYTES} bytes of the file"))
-    })?;
-    // Allow one byte more than expected, in case the file grows meanwhile.
-    file.take((FILE_BYTES - HEADER_BYTES) as u64).read_to_end(&mut bytes).map_err(io_error)?;
-    if bytes.len() != FILE_BYTES - HEADER_BYTES {
-        return Err(wrong_size(path, (HEADER_BYTES + bytes.len()) as u64));
-    }
 
-    let stored = bytes.as_chunks().0;
+    let stored = values.as_chunks().0;
     let value = |channel: usize, cell: usize| {
         (f64::from_le_bytes(stored[channel * CELL_COUNT + cell]) * SCALES[channel]) as f32
     };
