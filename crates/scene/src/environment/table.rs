@@ -26,7 +26,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::EnvironmentMap;
-use crate::math::colour::luminance;
+use crate::math::{colour::luminance, cumulative::write_cumulative};
 
 /// Luminance C that compensated tables subtract, in means of the map over the sphere: at least half of
 /// the energy is left, and without contrast the density stays as it is. Chosen by measurement
@@ -65,20 +65,6 @@ pub fn mean_sine(row: u32, height: u32) -> f64 {
 /// Weight of a texel in tables with a compensation.
 fn weight_of(texel: Vec3, compensation: f32) -> f32 {
     (luminance(texel) - compensation).max(0.0)
-}
-
-/// Writes the cumulative distribution of `weights` in single precision and returns their sum.
-/// Entries never decrease, repeat where a weight is 0, and are 1 from the last positive weight on.
-fn write_cumulative(weights: impl Iterator<Item = f64> + Clone, cumulative: &mut [f32]) -> f64 {
-    let sum: f64 = weights.clone().sum();
-    let last = weights.clone().enumerate().filter(|(_, weight)| *weight > 0.0).last();
-    let last = last.map_or(0, |(index, _)| index);
-    let mut running = 0.0;
-    for (index, (weight, entry)) in weights.zip(cumulative.iter_mut()).enumerate() {
-        running += weight;
-        *entry = if index >= last { 1.0 } else { ((running / sum) as f32).min(1.0) };
-    }
-    sum
 }
 
 /// Number of intervals in the guide of a cumulative distribution of `count` entries: a power of

@@ -6,7 +6,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use glam::{Vec3, vec3};
 use rayon::prelude::*;
 
-use crate::math::colour::luminance;
+use crate::math::{colour::luminance, cumulative::write_cumulative};
 use crate::measured::{layout::*, lookup};
 
 /// Sampling table of one bin of outgoing elevation.
@@ -46,7 +46,7 @@ impl SamplingRow {
             // Count both signs of φ_h.
             2.0 * (upper - lower) * std::f64::consts::PI / f64::from(MEASURED_AZIMUTH_BINS)
         };
-        let mut masses: Vec<f64> = cells
+        let masses: Vec<f64> = cells
             .iter()
             .zip(0..)
             .map(|(points, cell)| {
@@ -54,23 +54,11 @@ impl SamplingRow {
                 sum / points.len() as f64 * solid_angle(cell)
             })
             .collect();
-        let mut total: f64 = masses.iter().sum();
-        if total <= 0.0 {
+        let mut cumulative = vec![0.0; masses.len()];
+        if write_cumulative(masses.iter().copied(), &mut cumulative) <= 0.0 {
             // The material is black: any density serves.
-            masses = (0..MEASURED_SAMPLING_CELLS).map(solid_angle).collect();
-            total = masses.iter().sum();
-        }
-        let mut sum = 0.0;
-        let mut cumulative: Vec<f32> = masses
-            .iter()
-            .map(|mass| {
-                sum += mass;
-                (sum / total) as f32
-            })
-            .collect();
-        // Leave no probability to rounding behind the last cell that has any.
-        if let Some(last) = masses.iter().rposition(|mass| *mass > 0.0) {
-            cumulative[last..].fill(1.0);
+            let solid_angles = (0..MEASURED_SAMPLING_CELLS).map(solid_angle);
+            write_cumulative(solid_angles, &mut cumulative);
         }
         // Derive the density from the rounded probabilities, to match the samples exactly.
         let mut before = 0.0;
