@@ -7,8 +7,8 @@ use draco_core::{DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointIndex};
 use gltf::{
     Document,
     json::{
-        Accessor, Buffer, Index, Root,
-        accessor::{ComponentType, GenericComponentType, Type},
+        Buffer, Index, Root,
+        accessor::UNSIGNED_INT,
         buffer::View,
         mesh::Mode,
         validation::{Checked, USize64},
@@ -23,7 +23,8 @@ use meshopt_rs::{
         },
     },
 };
-use serde_json::Value;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
 
 use crate::{
     error::{Error, Result},
@@ -76,6 +77,11 @@ fn members(json: &Value) -> impl Iterator<Item = (usize, &Value)> {
     json.as_array().into_iter().flatten().enumerate()
 }
 
+/// Part of a document.
+fn part<T: DeserializeOwned>(json: Value) -> Result<T, String> {
+    serde_json::from_value(json).map_err(|error| error.to_string())
+}
+
 /// A number that must be there.
 fn count(json: &Value, key: &str) -> Result<usize, String> {
     let number = json[key].as_u64().and_then(|number| usize::try_from(number).ok());
@@ -103,35 +109,24 @@ struct Expansion<'a> {
 
 impl Expansion<'_> {
     /// Adds a buffer of `bytes`.
-    fn push(&mut self, bytes: Vec<u8>) -> Index<Buffer> {
-        let byte_length = USize64::from(bytes.len());
+    fn push(&mut self, bytes: Vec<u8>) -> Result<Index<Buffer>, String> {
+        let buffer = part(json!({"byteLength": bytes.len()}))?;
         self.buffers.push(bytes);
-        let (name, uri, extensions, extras) = Default::default();
-        self.root.push(Buffer { byte_length, name, uri, extensions, extras })
+        Ok(self.root.push(buffer))
     }
 
     /// Adds a buffer of `bytes` and a view of all of it.
-    fn push_view(&mut self, bytes: Vec<u8>) -> Index<View> {
-        let byte_length = USize64::from(bytes.len());
-        let buffer = self.push(bytes);
-        let (byte_offset, byte_stride, name, target, extensions, extras) = Default::default();
-        self.root.push(View {
-            buffer,
-            byte_length,
-            byte_offset,
-            byte_stride,
-            name,
-            target,
-            extensions,
-            extras,
-        })
+    fn push_view(&mut self, bytes: Vec<u8>) -> Result<Index<View>, String> {
+        let length = bytes.len();
+        let buffer = self.push(bytes)?.value();
+        Ok(self.root.push(part(json!({"buffer": buffer, "byteLength": length}))?))
     }
 
     /// Replaces what a buffer view shows by what its extension holds.
     fn expand_view(&mut self, index: usize, packed: &Value) -> Result<(), String> {
         let bytes = unpacked(packed, self.buffers)?;
         let byte_length = USize64::from(bytes.len());
-        let buffer = self.push(bytes);
+        let buffer = self.push(bytes)?;
         let view = &mut self.root.buffer_views[index];
         (view.buffer, view.byte_offset, view.byte_length) = (buffer, None, byte_length);
         Ok(())
@@ -182,27 +177,17 @@ impl Expansion<'_> {
                 let value = values.get(place..place + size);
                 bytes.extend(value.ok_or_else(|| format!("its {name} are truncated"))?);
             }
-            let view = self.push_view(bytes);
+            let view = self.push_view(bytes)?;
             let accessor = &mut self.root.accessors[at];
             (accessor.buffer_view, accessor.byte_offset) = (Some(view), None);
         }
         let corners = mesh.faces().iter().flatten().flat_map(|corner| corner.0.to_le_bytes());
-        let view = self.push_view(corners.collect());
-        let (byte_offset, extensions, extras, min, max, name, sparse) = Default::default();
-        let indices = Accessor {
-            buffer_view: Some(view),
-            byte_offset,
-            count: USize64::from(3 * mesh.num_faces()),
-            component_type: Checked::Valid(GenericComponentType(ComponentType::U32)),
-            extensions,
-            extras,
-            type_: Checked::Valid(Type::Scalar),
-            min,
-            max,
-            name,
-            normalized: false,
-            sparse,
-        };
+        let indices = part(json!({
+            "bufferView": self.push_view(corners.collect())?.value(),
+            "componentType": UNSIGNED_INT,
+            "count": 3 * mesh.num_faces(),
+            "type": "SCALAR",
+        }))?;
         let primitive = &mut self.root.meshes[mesh_index].primitives[index];
         primitive.mode = Checked::Valid(Mode::Triangles);
         let own = primitive.indices.map(|own| own.value());
