@@ -115,16 +115,11 @@ fn decode(
     let texel_bytes = u64::from(decoder.color_type().bytes_per_pixel());
     check_size([width, height].map(u64::from), texel_bytes, bytes.len(), ratio)?;
     let image = DynamicImage::from_decoder(decoder).map_err(unreadable)?;
-    let texels = match image {
-        DynamicImage::ImageLuma8(_)
-        | DynamicImage::ImageLumaA8(_)
-        | DynamicImage::ImageRgb8(_)
-        | DynamicImage::ImageRgba8(_) => Texels::Bytes(fours(image.into_rgba8().into_raw())),
-        DynamicImage::ImageLuma16(_)
-        | DynamicImage::ImageLumaA16(_)
-        | DynamicImage::ImageRgb16(_)
-        | DynamicImage::ImageRgba16(_) => Texels::Shorts(fours(image.into_rgba16().into_raw())),
-        image => {
+    let color = image.color();
+    let texels = match color.bytes_per_pixel() / color.channel_count() {
+        1 => Texels::Bytes(fours(image.into_rgba8().into_raw())),
+        2 => Texels::Shorts(fours(image.into_rgba16().into_raw())),
+        _ => {
             let mut repairs = Repairs::default();
             let pixels = image.into_rgb32f();
             let texels = pixels.pixels().map(|pixel| {
