@@ -10,6 +10,7 @@ use crate::{
     error::Result,
     file::{EnvironmentEntry, LampEntry, LampKindEntry, SceneFile},
     lamp::{LampKind, Spot},
+    mesh::label,
 };
 
 /// Light of a scene apart from emitting surfaces.
@@ -102,10 +103,8 @@ impl Loader<'_> {
 
     fn lamp(&self, index: usize, entry: &LampEntry) -> Result<Lamp> {
         let keys = &entry.keys;
-        let label = match &keys.name {
-            Some(name) => format!("lamp `{name}` (line {})", entry.line),
-            None => format!("lamp {index} (line {})", entry.line),
-        };
+        let label = label("lamp", index, keys.name.as_deref());
+        let label = format!("{label} (line {})", entry.line);
         let place = |position| self.vector(&format!("{label}: position"), position, FINITE);
         let power =
             |key: &str, power| self.vector(&format!("{label}: {key}"), power, (0.0, f32::MAX));

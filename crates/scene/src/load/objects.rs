@@ -18,7 +18,7 @@ use crate::{
     instances::Prototype,
     material::Material,
     memory,
-    mesh::{Mesh, MeshMaterial},
+    mesh::{Mesh, MeshMaterial, label},
     shapes::check_triangles,
     stage,
     transform::Transform,
@@ -400,8 +400,6 @@ fn object_label(index: usize, object: &ObjectEntry) -> String {
         ObjectSource::Mesh(mesh) => mesh.display().to_string(),
         ObjectSource::Shape { name, .. } => name.clone(),
     };
-    match &object.keys.name {
-        Some(name) => format!("object `{name}` ({source}, line {})", object.line),
-        None => format!("object {index} ({source}, line {})", object.line),
-    }
+    let name = label("object", index, object.keys.name.as_deref());
+    format!("{name} ({source}, line {})", object.line)
 }

@@ -4,6 +4,7 @@ use super::{FINITE, Loader};
 use crate::{
     error::Result,
     file::{Entry, PortalKeys},
+    mesh::label,
     portal::{MAX_PORTALS, Portal},
 };
 
@@ -27,10 +28,8 @@ impl Loader<'_> {
 
     fn portal(&self, index: usize, entry: &Entry<PortalKeys>) -> Result<Portal> {
         let keys = &entry.keys;
-        let label = match &keys.name {
-            Some(name) => format!("portal `{name}` (line {})", entry.line),
-            None => format!("portal {index} (line {})", entry.line),
-        };
+        let label = label("portal", index, keys.name.as_deref());
+        let label = format!("{label} (line {})", entry.line);
         let corner = self.vector(&format!("{label}: corner"), keys.corner, (-1e6, 1e6))?;
         let edge = |key: &str, edge: [f32; 3]| {
             let edge = self.vector(&format!("{label}: {key}"), edge, FINITE)?;

@@ -26,6 +26,11 @@ use crate::{
     triangulate::triangulate_in_space,
 };
 
+/// Name of a part of a file for messages, or its number from 0.
+pub(crate) fn label(part: &str, index: usize, name: Option<&str>) -> String {
+    name.map_or_else(|| format!("{part} {index}"), |name| format!("{part} `{name}`"))
+}
+
 /// Triangles in object space.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {

@@ -5,11 +5,12 @@ use std::collections::HashMap;
 use glam::{Mat4, Quat, Vec3};
 use gltf::animation::{Interpolation, Property, Sampler};
 
-use super::{GltfReader, contents::label};
+use super::GltfReader;
 use crate::{
     error::Result,
     features,
     math::keys::{Between, between, hermite},
+    mesh::label,
 };
 
 impl GltfReader<'_> {

@@ -12,7 +12,7 @@ use super::GltfReader;
 use crate::{
     error::Result,
     features::{self, Ignored},
-    mesh::{MeshCamera, Perspective},
+    mesh::{MeshCamera, Perspective, label},
 };
 
 /// Parts of the document with extensions that belong to no material, node or mesh.
@@ -28,10 +28,6 @@ const OTHER_PARTS: [&str; 10] = [
     "skins",
     "textures",
 ];
-
-pub(super) fn label(part: &str, index: usize, name: Option<&str>) -> String {
-    name.map_or_else(|| format!("{part} {index}"), |name| format!("{part} `{name}`"))
-}
 
 /// Counts an extension, unless it is done.
 pub(super) fn ignore_extension(

@@ -9,13 +9,13 @@ use gltf::Node;
 
 use super::{
     GltfReader,
-    contents::label,
     material::{number, vector},
 };
 use crate::{
     error::Result,
     features,
     lamp::{Lamp, LampKind, Spot, SpotFalloff},
+    mesh::label,
 };
 
 impl GltfReader<'_> {

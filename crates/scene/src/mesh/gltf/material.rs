@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::{
     GltfReader,
-    contents::{for_each_extension, ignore_extension, label},
+    contents::{for_each_extension, ignore_extension},
     glossiness,
 };
 use crate::{
@@ -15,7 +15,7 @@ use crate::{
     features::{self, Feature, Ignored},
     gloss::metallic_roughness,
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
-    mesh::{MeshMaterial, images},
+    mesh::{MeshMaterial, images, label},
     texture::{Channels, Encoding, TextureUse, texelwise::lie_alike},
 };
 

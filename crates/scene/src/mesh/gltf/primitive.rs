@@ -11,7 +11,7 @@ use crate::{
     error::Result,
     features,
     geometry::extend,
-    mesh::{Mesh, RepeatedMesh},
+    mesh::{Mesh, RepeatedMesh, label},
 };
 
 impl GltfReader<'_> {
@@ -238,7 +238,7 @@ impl GltfReader<'_> {
         let index = primitive.material().index().unwrap_or_default();
         let json = &self.json["materials"][index];
         if !json["extensions"]["KHR_materials_unlit"].is_null() {
-            let place = || super::contents::label("material", index, json["name"].as_str());
+            let place = || label("material", index, json["name"].as_str());
             self.ignored.add(features::GLTF_UNLIT_COLOR, place);
         }
         if !matches!(json["alphaMode"].as_str(), Some("MASK" | "BLEND")) {

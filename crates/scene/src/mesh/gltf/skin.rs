@@ -7,8 +7,8 @@ use gltf::{
     mesh::Semantic,
 };
 
-use super::{GltfReader, contents::label};
-use crate::error::Result;
+use super::GltfReader;
+use crate::{error::Result, mesh::label};
 
 /// Bytes of a matrix of singles.
 const MATRIX_BYTES: usize = 64;
