@@ -57,34 +57,17 @@ impl<'a> GltfReader<'a> {
         })
     }
 
-    /// Reads colours with or without opacity.
-    pub(super) fn colors_of(&self, accessor: &Accessor) -> Result<Vec<[f32; 4]>> {
-        if accessor.dimensions() == Dimensions::Vec3 {
-            let colors = self.vectors::<3>(accessor)?;
-            return Ok(colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect());
-        }
-        self.vectors::<4>(accessor)
-    }
-
     /// Reads the corners of triangles, all below `vertex_count`.
     pub(super) fn indices(&self, accessor: &Accessor, vertex_count: usize) -> Result<Vec<u32>> {
-        let kind = (accessor.data_type(), accessor.dimensions());
-        let indices: Vec<u32> = match kind {
-            (DataType::U8, Dimensions::Scalar) => {
-                self.elements(accessor, |bytes| u32::from(bytes[0]))?
-            }
-            (DataType::U16, Dimensions::Scalar) => self
-                .elements(accessor, |bytes| u32::from(u16::from_le_bytes([bytes[0], bytes[1]])))?,
-            (DataType::U32, Dimensions::Scalar) => self.elements(accessor, |bytes| {
-                u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
-            })?,
-            (data_type, dimensions) => {
-                return Err(self.error(format!(
-                    "accessor {}: expected unsigned indices, found {dimensions:?} of {data_type:?}",
-                    accessor.index()
-                )));
-            }
-        };
+        let (data_type, dimensions) = (accessor.data_type(), accessor.dimensions());
+        let is_unsigned = matches!(data_type, DataType::U8 | DataType::U16 | DataType::U32);
+        if !is_unsigned || dimensions != Dimensions::Scalar {
+            return Err(self.error(format!(
+                "accessor {}: expected unsigned indices, found {dimensions:?} of {data_type:?}",
+                accessor.index()
+            )));
+        }
+        let indices = self.elements(accessor, unsigned)?;
         match indices.iter().position(|&index| index as usize >= vertex_count) {
             Some(element) => Err(self.error(format!(
                 "accessor {}, element {element} (triangle {}): vertex index {} is out of range, \
@@ -131,7 +114,7 @@ impl<'a> GltfReader<'a> {
             let places = self.slices(&label, &indices.view(), from, count, index_size)?;
             let new = self.slices(&label, &values.view(), values.offset(), count, size)?;
             for (place, value) in places.zip(new) {
-                let place = place.iter().rev().fold(0, |sum, &byte| sum << 8 | usize::from(byte));
+                let place = unsigned(place) as usize;
                 *elements.get_mut(place).ok_or_else(|| {
                     self.error(format!("{label}: sparse index {place} is out of range"))
                 })? = element(value);
@@ -185,4 +168,9 @@ impl<'a> GltfReader<'a> {
                 ))
             })
     }
+}
+
+/// Unsigned number of up to four bytes.
+fn unsigned(bytes: &[u8]) -> u32 {
+    bytes.iter().rev().fold(0, |sum, &byte| sum << 8 | u32::from(byte))
 }

@@ -101,9 +101,6 @@ pub fn read(
     mesh.cameras = reader.cameras.into_iter().map(|(_, camera)| camera).collect();
     let ignored = reader.ignored.warnings(path);
     warnings.extend(ignored);
-    if mesh.normals.iter().all(|normal| *normal == [0.0; 3]) {
-        mesh.normals = Vec::new();
-    }
     mesh.part_coincident(path, warnings);
     mesh.complete_tangents(-1.0);
     let mut repeated = std::mem::take(&mut mesh.repeated);

@@ -3,6 +3,7 @@
 use glam::{Mat3, Mat4, Vec3};
 use gltf::{
     Accessor, Primitive,
+    accessor::Dimensions,
     mesh::{Mode, Semantic},
 };
 
@@ -83,19 +84,15 @@ impl GltfReader<'_> {
                 continue;
             }
             self.morph(&mut positions, target.positions(), weight)?;
-            if let Some(normals) = &mut normals {
-                self.morph(normals, target.normals(), weight)?;
-            }
-            if let Some(tangents) = &mut tangents {
-                self.morph(tangents, target.tangents(), weight)?;
-            }
+            self.morph(&mut normals, target.normals(), weight)?;
+            self.morph(&mut tangents, target.tangents(), weight)?;
         }
         let material = primitive.material().index().map(|index| self.material_index(index));
         let material = material.transpose()?;
         let (world_from_node, mirrors) = match place {
             Place::Node(matrix) => (matrix, Mat3::from_mat4(matrix).determinant() < 0.0),
             Place::Joints(joints) => {
-                let (normals, tangents) = (normals.as_mut(), tangents.as_mut());
+                let (normals, tangents) = (&mut normals, &mut tangents);
                 let mirrors = self.pose(primitive, joints, &mut positions, normals, tangents)?;
                 (Mat4::IDENTITY, mirrors)
             }
@@ -109,22 +106,19 @@ impl GltfReader<'_> {
         // A node scaled to nothing has no inverse; its normals become zero.
         let turn = linear.inverse().transpose();
         let to_world =
-            |normal: [f32; 3]| (turn * Vec3::from_array(normal)).normalize_or_zero().to_array();
-        let normals = normals.map(|normals| normals.into_iter().map(to_world).collect());
-        self.mesh.normals.extend::<Vec<_>>(normals.unwrap_or_default());
-        self.mesh.normals.resize(end, [0.0; 3]);
-        let to_world = |[x, y, z, sign]: [f32; 4]| {
+            |normal: &[f32; 3]| (turn * Vec3::from_array(*normal)).normalize_or_zero().to_array();
+        extend(&mut self.mesh.normals, &normals, first_vertex, end, [0.0; 3], to_world);
+        let to_world = |&[x, y, z, sign]: &[f32; 4]| {
             let tangent = (linear * Vec3::new(x, y, z)).normalize_or_zero();
             tangent.extend(if mirrors { -sign } else { sign }).to_array()
         };
-        let tangents = tangents.map(|all| all.into_iter().map(to_world).collect());
-        append(&mut self.mesh.tangents, tangents, first_vertex, end, [0.0; 4]);
+        extend(&mut self.mesh.tangents, &tangents, first_vertex, end, [0.0; 4], to_world);
         for set in 0..2 {
             let uvs = self.attribute::<2>(primitive, &Semantic::TexCoords(set), count)?;
-            append(&mut self.mesh.uvs[set as usize], uvs, first_vertex, end, [0.0; 2]);
+            extend(&mut self.mesh.uvs[set as usize], &uvs, first_vertex, end, [0.0; 2], |uv| *uv);
         }
         let colors = self.colors(primitive, material, count)?;
-        append(&mut self.mesh.colors, colors, first_vertex, end, [1.0; 4]);
+        extend(&mut self.mesh.colors, &colors, first_vertex, end, [1.0; 4], |color| *color);
         let indices = match primitive.indices() {
             Some(accessor) => self.indices(&accessor, count)?,
             None => (0..count as u32).collect(),
@@ -168,44 +162,34 @@ impl GltfReader<'_> {
         Ok(())
     }
 
-    /// Reads an attribute, one vector for each of `count` positions.
+    /// Reads an attribute, one vector for each of `count` positions; empty if the primitive has none.
     pub(super) fn attribute<const N: usize>(
         &self,
         primitive: &Primitive,
         semantic: &Semantic,
         count: usize,
-    ) -> Result<Option<Vec<[f32; N]>>> {
-        let Some(accessor) = primitive.get(semantic) else { return Ok(None) };
+    ) -> Result<Vec<[f32; N]>> {
+        let Some(accessor) = primitive.get(semantic) else { return Ok(Vec::new()) };
         let vectors = self.vectors::<N>(&accessor)?;
-        self.check_length(primitive, semantic, vectors.len(), count)?;
-        Ok(Some(vectors))
-    }
-
-    fn check_length(
-        &self,
-        primitive: &Primitive,
-        semantic: &Semantic,
-        found: usize,
-        count: usize,
-    ) -> Result<()> {
-        if found == count {
-            return Ok(());
+        if vectors.len() == count {
+            return Ok(vectors);
         }
         Err(self.error(format!(
-            "primitive {} has {count} positions and {found} elements of {}",
+            "primitive {} has {count} positions and {} elements of {}",
             primitive.index(),
+            vectors.len(),
             semantic.to_string()
         )))
     }
 
-    /// Adds the differences of a morph target.
+    /// Adds the differences of a morph target to vectors, if there are any.
     fn morph<const N: usize>(
         &self,
         vectors: &mut [[f32; N]],
         target: Option<Accessor>,
         weight: f32,
     ) -> Result<()> {
-        let Some(accessor) = target else { return Ok(()) };
+        let Some(accessor) = target.filter(|_| !vectors.is_empty()) else { return Ok(()) };
         let differences = self.vectors::<3>(&accessor)?;
         if differences.len() != vectors.len() {
             return Err(self.error(format!(
@@ -229,12 +213,16 @@ impl GltfReader<'_> {
         primitive: &Primitive,
         material: Option<usize>,
         count: usize,
-    ) -> Result<Option<Vec<[f32; 4]>>> {
+    ) -> Result<Vec<[f32; 4]>> {
         let semantic = Semantic::Colors(0);
-        let Some(accessor) = primitive.get(&semantic) else { return Ok(None) };
-        let mut colors = self.colors_of(&accessor)?;
-        self.check_length(primitive, &semantic, colors.len(), count)?;
-        let Some(material) = material else { return Ok(Some(colors)) };
+        let accessor = primitive.get(&semantic);
+        let mut colors = if accessor.is_some_and(|own| own.dimensions() == Dimensions::Vec3) {
+            let opaque = |[r, g, b]: [f32; 3]| [r, g, b, 1.0];
+            self.attribute::<3>(primitive, &semantic, count)?.into_iter().map(opaque).collect()
+        } else {
+            self.attribute::<4>(primitive, &semantic, count)?
+        };
+        let Some(material) = material.filter(|_| !colors.is_empty()) else { return Ok(colors) };
         let index = primitive.material().index().unwrap_or_default();
         let json = &self.json["materials"][index];
         if !json["extensions"]["KHR_materials_unlit"].is_null() {
@@ -245,17 +233,6 @@ impl GltfReader<'_> {
             colors.iter_mut().for_each(|color| color[3] = 1.0);
         }
         self.mesh.materials[material].material.surface.vertex_color = true;
-        Ok(Some(colors))
+        Ok(colors)
     }
-}
-
-/// Appends an attribute to an array that stays empty until a primitive has it.
-fn append<const N: usize>(
-    all: &mut Vec<[f32; N]>,
-    own: Option<Vec<[f32; N]>>,
-    first_vertex: usize,
-    end: usize,
-    absent: [f32; N],
-) {
-    extend(all, &own.unwrap_or_default(), first_vertex, end, absent, |own| *own);
 }

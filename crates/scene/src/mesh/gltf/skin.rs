@@ -72,15 +72,17 @@ impl GltfReader<'_> {
         primitive: &Primitive,
         joints: &[Mat4],
         positions: &mut [[f32; 3]],
-        normals: Option<&mut Vec<[f32; 3]>>,
-        tangents: Option<&mut Vec<[f32; 4]>>,
+        normals: &mut [[f32; 3]],
+        tangents: &mut [[f32; 4]],
     ) -> Result<bool> {
         let count = positions.len();
         let mut matrices = vec![(Mat4::ZERO, 0.0); count];
         for set in 0.. {
             let names = self.attribute::<4>(primitive, &Semantic::Joints(set), count)?;
             let weights = self.attribute::<4>(primitive, &Semantic::Weights(set), count)?;
-            let (Some(names), Some(weights)) = (names, weights) else { break };
+            if names.is_empty() || weights.is_empty() {
+                break;
+            }
             for (vertex, (sum, total)) in matrices.iter_mut().enumerate() {
                 for (&joint, &weight) in names[vertex].iter().zip(&weights[vertex]) {
                     if weight == 0.0 {
@@ -106,11 +108,11 @@ impl GltfReader<'_> {
         for (position, matrix) in positions.iter_mut().zip(&matrices) {
             *position = matrix.transform_point3((*position).into()).into();
         }
-        for (normal, matrix) in normals.into_iter().flatten().zip(&matrices) {
+        for (normal, matrix) in normals.iter_mut().zip(&matrices) {
             let turn = Mat3::from_mat4(*matrix).inverse().transpose();
             *normal = (turn * Vec3::from(*normal)).into();
         }
-        for (tangent, matrix) in tangents.into_iter().flatten().zip(&matrices) {
+        for (tangent, matrix) in tangents.iter_mut().zip(&matrices) {
             let [x, y, z, sign] = *tangent;
             *tangent = matrix.transform_vector3(Vec3::new(x, y, z)).extend(sign).into();
         }
