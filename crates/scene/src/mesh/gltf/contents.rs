@@ -30,11 +30,7 @@ const OTHER_PARTS: [&str; 10] = [
 ];
 
 /// Counts an extension, unless it is done.
-pub(super) fn ignore_extension(
-    ignored: &mut Ignored,
-    extension: &str,
-    place: impl FnOnce() -> String,
-) {
+fn ignore_extension(ignored: &mut Ignored, extension: &str, place: impl FnOnce() -> String) {
     if features::GLTF_EXTENSIONS.contains(&extension) {
         return;
     }
@@ -45,22 +41,23 @@ pub(super) fn ignore_extension(
     }
 }
 
-/// Calls `found` with every extension in a part of the document, at any depth.
-pub(super) fn for_each_extension(value: &Value, found: &mut impl FnMut(&str)) {
-    match value {
+/// Counts the extensions in a part of the document, at any depth.
+pub(super) fn ignore_extensions(ignored: &mut Ignored, part: &Value, place: &impl Fn() -> String) {
+    match part {
         Value::Object(members) => {
             for (key, member) in members {
                 if key == "extensions" {
-                    member.as_object().into_iter().flatten().for_each(|(name, _)| found(name));
+                    let extensions = member.as_object().into_iter().flatten();
+                    extensions.for_each(|(name, _)| ignore_extension(ignored, name, place));
                 }
                 // Extras are free to hold anything.
                 if key != "extras" {
-                    for_each_extension(member, found);
+                    ignore_extensions(ignored, member, place);
                 }
             }
         }
         Value::Array(elements) => {
-            elements.iter().for_each(|element| for_each_extension(element, found));
+            elements.iter().for_each(|element| ignore_extensions(ignored, element, place));
         }
         _ => {}
     }
@@ -79,8 +76,7 @@ impl GltfReader<'_> {
         }
         for part in OTHER_PARTS {
             for (index, value) in json[part].as_array().into_iter().flatten().enumerate() {
-                let place = || format!("{part} {index}");
-                for_each_extension(value, &mut |name| ignore_extension(ignored, name, place));
+                ignore_extensions(ignored, value, &|| format!("{part} {index}"));
             }
         }
         for (name, _) in json["extensions"].as_object().into_iter().flatten() {
@@ -93,7 +89,6 @@ impl GltfReader<'_> {
 
     /// Keeps the camera of a node; counts its other extensions.
     pub(super) fn read_node(&mut self, node: &Node, world_from_node: Mat4) {
-        let place = || label("node", node.index(), node.name());
         if let Some(camera) = node.camera() {
             let names = [camera.name(), node.name()].into_iter().flatten().map(str::to_owned);
             let perspective = match camera.projection() {
@@ -107,8 +102,8 @@ impl GltfReader<'_> {
             let found = MeshCamera { names, world_from_camera: world_from_node, perspective };
             self.cameras.push((camera.index(), found));
         }
-        let json = &self.json["nodes"][node.index()];
-        for_each_extension(json, &mut |name| ignore_extension(&mut self.ignored, name, place));
+        let place = || label("node", node.index(), node.name());
+        ignore_extensions(&mut self.ignored, &self.json["nodes"][node.index()], &place);
     }
 
     /// Counts what the primitives of a mesh hold besides triangles.
@@ -131,8 +126,7 @@ impl GltfReader<'_> {
                 }
             }
         }
-        let json = &self.json["meshes"][mesh.index()];
-        for_each_extension(json, &mut |name| ignore_extension(ignored, name, place));
+        ignore_extensions(ignored, &self.json["meshes"][mesh.index()], &place);
     }
 
     /// Placements of a node's mesh: its own, or those of `EXT_mesh_gpu_instancing`.

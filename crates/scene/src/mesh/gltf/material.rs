@@ -1,15 +1,9 @@
 //! Materials of a glTF document → materials of a scene.
 
-use std::rc::Rc;
-
 use glam::{Vec2, Vec3};
 use serde_json::Value;
 
-use super::{
-    GltfReader,
-    contents::{for_each_extension, ignore_extension},
-    glossiness,
-};
+use super::{GltfReader, contents::ignore_extensions, glossiness};
 use crate::{
     error::Result,
     features::{self, Feature, Ignored},
@@ -68,20 +62,25 @@ fn color(json: &Value, key: &str, default: [f32; 3]) -> Vec3 {
 }
 
 /// Material while it is read.
-struct Reading<'a> {
+pub(super) struct Reading<'a> {
     json: &'a Value,
-    place: Rc<dyn Fn() -> String + 'a>,
+    /// Number or name, for messages.
+    pub(super) place: String,
     ignored: Ignored,
 }
 
-impl Reading<'_> {
+impl<'a> Reading<'a> {
+    fn new(json: &'a Value, index: usize) -> Self {
+        let place = label("material", index, json["name"].as_str());
+        Self { json, place, ignored: Ignored::default() }
+    }
+
     fn extension(&self, name: &str) -> &Value {
         &self.json["extensions"][name]
     }
 
-    fn ignore(&mut self, feature: Feature) {
-        let place = Rc::clone(&self.place);
-        self.ignored.add(feature, || place());
+    pub(super) fn ignore(&mut self, feature: Feature) {
+        self.ignored.add(feature, || self.place.clone());
     }
 
     fn ignore_if(&mut self, is_there: bool, feature: Feature) {
@@ -168,10 +167,9 @@ impl GltfReader<'_> {
         if factor < GLASS || !json["extensions"]["KHR_materials_unlit"].is_null() {
             return Ok(None);
         }
-        let place = || label("material", index, json["name"].as_str());
-        let mut ignored = Ignored::default();
         let info = &transmission["transmissionTexture"];
-        let Some(texture) = self.texture(info, RED, &mut ignored, &place)? else { return Ok(None) };
+        let texture = self.texture(info, RED, &mut Reading::new(json, index))?;
+        let Some(texture) = texture else { return Ok(None) };
         let least = GLASS / factor;
         let is_reached = texture.values().iter().any(|value| value[0] >= least);
         Ok(is_reached.then_some((texture, least)))
@@ -180,12 +178,8 @@ impl GltfReader<'_> {
     /// Reads a material, which is glass or not, or as its numbers say.
     fn material(&mut self, index: usize, is_glass: Option<bool>) -> Result<MeshMaterial> {
         let json = &self.json["materials"][index];
-        let name = json["name"].as_str();
-        let place = Rc::new(move || label("material", index, name));
-        let mut reading = Reading { json, place, ignored: Ignored::default() };
-        for_each_extension(json, &mut |extension| {
-            ignore_extension(&mut reading.ignored, extension, || label("material", index, name));
-        });
+        let mut reading = Reading::new(json, index);
+        ignore_extensions(&mut reading.ignored, json, &|| reading.place.clone());
         let mut reflection = if reading.extension("KHR_materials_pbrSpecularGlossiness").is_null() {
             self.metallic_roughness(&mut reading)?
         } else {
@@ -196,7 +190,7 @@ impl GltfReader<'_> {
         } else {
             self.transmission(&mut reading, &mut reflection, is_glass)?;
             let normal = &json["normalTexture"];
-            reflection.surface.normal = self.use_texture(normal, VECTOR, &mut reading)?;
+            reflection.surface.normal = self.texture(normal, VECTOR, &mut reading)?;
             reflection.surface.normal_scale = number(normal, "scale", 1.0);
             reflection.surface.emission = self.emission(&mut reading)?;
         }
@@ -210,19 +204,10 @@ impl GltfReader<'_> {
             },
             _ => Opacity::default(),
         };
-        let material = Material { name: name.unwrap_or_default().to_owned(), kind, surface };
+        let name = json["name"].as_str().unwrap_or_default().to_owned();
+        let material = Material { name, kind, surface };
         let is_culled = !json["doubleSided"].as_bool().unwrap_or(false);
         Ok(MeshMaterial { material, ignored: reading.ignored, is_culled })
-    }
-
-    fn use_texture(
-        &mut self,
-        info: &Value,
-        meaning: (Channels, Encoding),
-        reading: &mut Reading,
-    ) -> Result<Option<TextureUse>> {
-        let place = Rc::clone(&reading.place);
-        self.texture(info, meaning, &mut reading.ignored, &*place)
     }
 
     /// The model of the core format with `KHR_materials_ior` and `KHR_materials_specular`.
@@ -250,8 +235,8 @@ impl GltfReader<'_> {
         reading.ignore_if(has_textures, features::GLTF_SPECULAR_TEXTURE);
         let packed = &pbr["metallicRoughnessTexture"];
         let mut surface = self.colored(&pbr["baseColorTexture"], reading)?;
-        surface.roughness = self.use_texture(packed, GREEN, reading)?;
-        surface.metallic = self.use_texture(packed, BLUE, reading)?;
+        surface.roughness = self.texture(packed, GREEN, reading)?;
+        surface.metallic = self.texture(packed, BLUE, reading)?;
         let [_, _, _, alpha] = vector(pbr, "baseColorFactor", [1.0; 4]);
         Ok(Reflection { kind, surface, base_color, alpha: alpha.clamp(0.0, 1.0) })
     }
@@ -267,7 +252,7 @@ impl GltfReader<'_> {
         let [_, _, _, alpha] = vector(model, "diffuseFactor", [1.0; 4]);
         let alpha = alpha.clamp(0.0, 1.0);
         let mut surface = self.colored(&model["diffuseTexture"], reading)?;
-        let specular = self.use_texture(&model["specularGlossinessTexture"], COLOR, reading)?;
+        let specular = self.texture(&model["specularGlossinessTexture"], COLOR, reading)?;
         let mut roughness = 1.0 - glossiness;
         let lie_alike = match (&surface.color, &specular) {
             (Some(own), Some(specular)) => lie_alike(own, specular),
@@ -316,7 +301,7 @@ impl GltfReader<'_> {
 
     /// Surface with a texture of colour and opacity.
     fn colored(&mut self, info: &Value, reading: &mut Reading) -> Result<Surface> {
-        let color = self.use_texture(info, COLOR, reading)?;
+        let color = self.texture(info, COLOR, reading)?;
         let opacity = color.as_ref().filter(|color| images::has_alpha(&color.texture));
         let opacity = opacity.map(|color| TextureUse {
             channels: ALPHA.0,
@@ -342,7 +327,7 @@ impl GltfReader<'_> {
         };
         let mean = |texture: &Option<TextureUse>| texture.as_ref().map(TextureUse::mean);
         let mean_number = |texture: &Option<TextureUse>| mean(texture).map_or(1.0, |mean| mean[0]);
-        let texture = self.use_texture(&transmission["transmissionTexture"], RED, reading)?;
+        let texture = self.texture(&transmission["transmissionTexture"], RED, reading)?;
         reading.ignore_if(is_glass.is_some(), features::GLTF_TRANSMISSION_TEXTURE);
         let transmitted = share(transmission, "transmissionFactor", 0.0)
             * mean_number(&texture)
@@ -390,12 +375,12 @@ impl GltfReader<'_> {
             return Ok(None);
         }
         if !radiance.is_finite() {
-            let place = (reading.place)();
+            let place = &reading.place;
             return Err(
                 self.error(format!("{place}: expected a finite emission, found {radiance}"))
             );
         }
-        let texture = self.use_texture(&json["emissiveTexture"], COLOR, reading)?;
+        let texture = self.texture(&json["emissiveTexture"], COLOR, reading)?;
         let two_sided = json["doubleSided"].as_bool().unwrap_or(false);
         Ok(Some(Emission { radiance, texture, two_sided }))
     }

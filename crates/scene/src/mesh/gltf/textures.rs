@@ -6,11 +6,11 @@ use serde_json::Value;
 
 use super::{
     GltfReader, document,
-    material::{number, vector},
+    material::{Reading, number, vector},
 };
 use crate::{
     error::Result,
-    features::{self, Ignored},
+    features,
     texture::{Channels, Encoding, Interpolation, Texture, TextureUse, Wrap},
 };
 
@@ -25,8 +25,7 @@ impl GltfReader<'_> {
         &mut self,
         info: &Value,
         (channels, encoding): (Channels, Encoding),
-        ignored: &mut Ignored,
-        place: &dyn Fn() -> String,
+        reading: &mut Reading,
     ) -> Result<Option<TextureUse>> {
         if info.is_null() {
             return Ok(None);
@@ -35,8 +34,8 @@ impl GltfReader<'_> {
         let number_of = |value: &Value| value.as_u64().and_then(|n| usize::try_from(n).ok());
         let Some(texture) = number_of(&info["index"]).and_then(|index| json["textures"].get(index))
         else {
-            let index = &info["index"];
-            return Err(self.error(format!("{}: the file has no texture {index}", place())));
+            let (place, index) = (&reading.place, &info["index"]);
+            return Err(self.error(format!("{place}: the file has no texture {index}")));
         };
         let webp = &texture["extensions"]["EXT_texture_webp"];
         let Some(source) = number_of(&texture["source"]).or(number_of(&webp["source"])) else {
@@ -51,11 +50,10 @@ impl GltfReader<'_> {
                 return Err(self.error(format!(
                     "{}: texture {} has no image but that of `{name}`, which is not read; expected \
                      one in PNG, JPEG or WebP{help}",
-                    place(),
-                    info["index"]
+                    reading.place, info["index"]
                 )));
             }
-            ignored.add(features::GLTF_NO_IMAGE, place);
+            reading.ignore(features::GLTF_NO_IMAGE);
             return Ok(None);
         };
         let transform = &info["extensions"]["KHR_texture_transform"];
@@ -64,11 +62,11 @@ impl GltfReader<'_> {
             0 => 0,
             1 => 1,
             _ => {
-                ignored.add(features::GLTF_HIGH_UV, place);
+                reading.ignore(features::GLTF_HIGH_UV);
                 return Ok(None);
             }
         };
-        let Some(image) = self.image(source, place)? else { return Ok(None) };
+        let Some(image) = self.image(source, &reading.place)? else { return Ok(None) };
         let sampler = number_of(&texture["sampler"]).and_then(|at| json["samplers"].get(at));
         let sampler = sampler.unwrap_or(&Value::Null);
         let wrap = |key: &str| match sampler[key].as_u64() {
@@ -92,7 +90,7 @@ impl GltfReader<'_> {
     }
 
     /// Reads an image, or returns it again; one that cannot be read is a warning.
-    fn image(&mut self, index: usize, place: &dyn Fn() -> String) -> Result<Option<Arc<Texture>>> {
+    fn image(&mut self, index: usize, place: &str) -> Result<Option<Arc<Texture>>> {
         if let Some(found) = self.embedded.get(&index) {
             return Ok(found.clone());
         }
@@ -103,7 +101,7 @@ impl GltfReader<'_> {
                 Some(Some(bytes)) => Texture::decode(&name, &bytes, self.warnings),
                 Some(None) => Err("not base64 data".to_owned()),
                 None => match document::beside(self.path, uri) {
-                    Ok(path) => return Ok(self.images.load(&path, &place(), self.warnings)),
+                    Ok(path) => return Ok(self.images.load(&path, place, self.warnings)),
                     Err(error) => Err(error.to_string()),
                 },
             }
@@ -120,7 +118,6 @@ impl GltfReader<'_> {
         let texture = match decoded {
             Ok(texture) => Some(Arc::new(texture)),
             Err(message) => {
-                let place = place();
                 self.warnings
                     .push(format!("{name}: {message}; rendered without this texture ({place})"));
                 None
