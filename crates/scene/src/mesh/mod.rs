@@ -221,17 +221,6 @@ impl Mesh {
 
     /// Parts that the materials in use hold and that are left out, but for those whose name `is_replaced`.
     pub fn ignored_in_materials(&self, is_replaced: impl Fn(&str) -> bool) -> Ignored {
-        let mut ignored = Ignored::default();
-        for MeshMaterial { material, ignored: own, .. } in self.used_materials() {
-            if !is_replaced(&material.name) {
-                ignored.merge(own);
-            }
-        }
-        ignored
-    }
-
-    /// Materials of at least one triangle.
-    pub fn used_materials(&self) -> impl Iterator<Item = &MeshMaterial> {
         let mut used = vec![false; self.materials.len()];
         for (triangles, material) in self.material_runs() {
             if let Some(material) = material.filter(|_| !triangles.is_empty()) {
@@ -241,7 +230,15 @@ impl Mesh {
         for repeated in self.repeated.iter().filter_map(|repeated| repeated.material) {
             used[repeated] = true;
         }
-        self.materials.iter().zip(used).filter_map(|(material, used)| used.then_some(material))
+        let mut ignored = Ignored::default();
+        for (MeshMaterial { material, ignored: own, .. }, is_used) in
+            self.materials.iter().zip(used)
+        {
+            if is_used && !is_replaced(&material.name) {
+                ignored.merge(own);
+            }
+        }
+        ignored
     }
 
     /// Triangles of each run, with its material.
