@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{LoadOptions, Loader, default_material, light::Light, viewed, whole};
+use super::{Loader, default_material, whole};
 use crate::{
     EnvironmentMap, Scene, beside::Folder, error::Result, files, import::Imported, mitsuba, pbrt,
 };
@@ -11,14 +11,15 @@ impl Loader<'_> {
     /// Reads the file at the loader's path by its extension, with the camera that is named; `None` for a
     /// format that cannot be a whole scene.
     pub(super) fn import(&self, camera: Option<&str>) -> Result<Option<Imported>> {
+        let folder = || Folder::of(self.path).allowing(self.options.allow_root.as_deref());
         let mut imported = if files::extension(self.path) == "xml" {
-            mitsuba::read(self.path, camera, Folder::of(self.path).allowing(self.allowed))?
+            mitsuba::read(self.path, camera, folder())?
         } else if pbrt::is_pbrt(self.path) {
             if let Some(name) = camera {
                 let message = "a pbrt file has one camera; the option is for glTF files";
                 return Err(self.error(format!("--camera {name}: {message}")));
             }
-            pbrt::read(self.path, Folder::of(self.path).allowing(self.allowed))?
+            pbrt::read(self.path, folder())?
         } else if whole::is_whole(self.path) {
             self.whole(camera)?
         } else {
@@ -33,33 +34,29 @@ impl Loader<'_> {
 
     /// Makes a scene of an imported file. The map of `--environment` replaces its own; a format without
     /// one is lit by white.
-    pub(super) fn imported(&self, imported: Imported, options: &LoadOptions) -> Result<Scene> {
-        let Imported { film, asked, lamps, materials, geometry, variants, .. } = imported;
-        let (mut inputs, mut warnings) = (imported.inputs, imported.warnings);
-        let camera = self.camera(&viewed(&imported.camera, options))?;
-        self.check_film(&film)?;
-        let mut environment = match (&options.environment, imported.environment) {
+    pub(super) fn imported(&self, imported: Imported) -> Result<Scene> {
+        let empty = self.scene(&imported.camera, imported.film)?;
+        let Imported { asked, lamps, materials, geometry, variants, inputs, warnings, .. } =
+            imported;
+        let mut scene =
+            Scene { asked, lamps, materials, geometry, variants, inputs, warnings, ..empty };
+        scene.environment = match (&self.options.environment, imported.environment) {
             (Some(map), _) => {
-                inputs.push(map.clone());
-                EnvironmentMap::load(map, 1.0, 0.0, &mut warnings)?
+                scene.inputs.push(map.clone());
+                EnvironmentMap::load(map, 1.0, 0.0, &mut scene.warnings)?
             }
             (None, Some(environment)) => environment,
             (None, None) => {
-                warnings.push(format!(
+                scene.warnings.push(format!(
                     "{}: no --environment; lit by white light of radiance 1 from everywhere",
                     self.path.display()
                 ));
-                EnvironmentMap::constant(Vec3::ONE, 1.0).map_err(|message| self.error(message))?
+                self.uniform_light(Vec3::ONE)?
             }
         };
-        if let Some(rotation_deg) = options.rotation_deg {
-            environment.rotation_rad = rotation_deg.rem_euclid(360.0).to_radians();
+        if let Some(rotation_deg) = self.options.rotation_deg {
+            scene.environment.rotation_rad = rotation_deg.rem_euclid(360.0).to_radians();
         }
-        let light = Light { environment, lamps, portals: Vec::new() };
-        let mut scene = self.scene(camera, film, light, materials, geometry, warnings);
-        scene.inputs = inputs;
-        scene.asked = asked;
-        scene.variants = variants;
-        Ok(scene)
+        Ok(self.finished(scene))
     }
 }

@@ -1,15 +1,12 @@
 //! `[[include]]`: everything in a file of another format, placed in the scene.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, path::Path};
 
 use glam::Vec3;
 
 use super::{Loader, objects::lit_material, whole};
 use crate::{
-    Geometry, Lamp,
+    Geometry, Lamp, Scene,
     error::Result,
     features,
     file::{Entry, IncludeKeys},
@@ -21,24 +18,18 @@ use crate::{
 };
 
 impl Loader<'_> {
-    /// Appends the triangles of a file to the geometry, and its materials, apart from those that the
-    /// entry replaces; returns its lamps.
-    pub(super) fn include(
-        &self,
-        entry: &Entry<IncludeKeys>,
-        materials: &mut Vec<Material>,
-        geometry: &mut Geometry,
-        inputs: &mut Vec<PathBuf>,
-        warnings: &mut Vec<String>,
-    ) -> Result<Vec<Lamp>> {
+    /// Appends triangles, lamps and materials of a file to those of the scene, apart from the materials that
+    /// the entry replaces.
+    pub(super) fn include(&self, entry: &Entry<IncludeKeys>, scene: &mut Scene) -> Result<()> {
         let IncludeKeys { file, scale, rotate_deg, translate, materials: replaced, light_group } =
             &entry.keys;
         let label = format!("include {} (line {})", file.display(), entry.line);
         self.check_light_group(&label, light_group.as_deref())?;
         self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
-        let path = self.folder.join(file);
+        let path = self.file(file);
         let (own_materials, mut placed, mut lamps) =
-            self.contents(&label, &path, replaced, inputs, warnings)?;
+            self.contents(&label, &path, replaced, scene)?;
+        let Scene { materials, geometry, warnings, .. } = scene;
         for name in replaced.keys() {
             let is_there = own_materials.iter().any(|material| material.name == *name);
             self.check(is_there, || {
@@ -109,7 +100,8 @@ impl Loader<'_> {
         if count == 0 && lamps.is_empty() {
             warnings.push(format!("{label}: the file has no triangles and no lamps"));
         }
-        Ok(lamps.into_iter().map(|lamp| place_lamp(lamp, &transform)).collect())
+        scene.lamps.extend(lamps.into_iter().map(|lamp| place_lamp(lamp, &transform)));
+        Ok(())
     }
 
     /// Takes over the instances of an included file, whose materials have `places` among those of the scene.
@@ -162,8 +154,7 @@ impl Loader<'_> {
         label: &str,
         path: &Path,
         replaced: &BTreeMap<String, String>,
-        inputs: &mut Vec<PathBuf>,
-        warnings: &mut Vec<String>,
+        Scene { inputs, warnings, .. }: &mut Scene,
     ) -> Result<(Vec<Material>, Geometry, Vec<Lamp>)> {
         if !whole::is_whole(path) {
             let imported = self.beside(path).import(None)?.ok_or_else(|| {
@@ -179,7 +170,8 @@ impl Loader<'_> {
             }
             return Ok((imported.materials, imported.geometry, imported.lamps));
         }
-        let mut mesh = Mesh::read_at(path, self.time, None, Some(Budget::default()), warnings)?;
+        let (time, budget) = (self.options.time, Some(Budget::default()));
+        let mut mesh = Mesh::read_at(path, time, None, budget, warnings)?;
         inputs.push(path.to_path_buf());
         inputs.extend_from_slice(&mesh.side_files);
         let mut ignored = mesh.ignored_in_materials(|name| replaced.contains_key(name));

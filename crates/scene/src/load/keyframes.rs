@@ -10,10 +10,10 @@ use crate::{
 };
 
 impl Loader<'_> {
-    /// Returns the camera at `time`: that of the key frames, each number along a smooth curve that never
-    /// leaves the range of its two keys; before the first and after the last it stands. Without a time or key
-    /// frames, the camera of `[camera]`.
-    pub(super) fn camera_at(&self, file: &SceneFile, time: Option<f32>) -> Result<CameraEntry> {
+    /// Returns the camera at the time of the options: that of the key frames, each number along a smooth curve
+    /// that never leaves the range of its two keys; before the first and after the last it stands. Without a
+    /// time or key frames, the camera of `[camera]`.
+    pub(super) fn camera_at(&self, file: &SceneFile) -> Result<CameraEntry> {
         let mut keys = Vec::new();
         for Entry { keys: frame, .. } in &file.keyframes {
             let camera = completed(frame, &file.camera);
@@ -31,7 +31,9 @@ impl Loader<'_> {
         self.check(ascend, || {
             format!("camera.keyframe: expected times that ascend, found {times:?}")
         })?;
-        let Some(time) = time.filter(|_| !keys.is_empty()) else { return Ok(file.camera.clone()) };
+        let Some(time) = self.options.time.filter(|_| !keys.is_empty()) else {
+            return Ok(file.camera.clone());
+        };
         let place = between(&times, time);
         let number =
             |of: &dyn Fn(&CameraEntry) -> f32| monotone(&times, |key| of(&keys[key]), place);

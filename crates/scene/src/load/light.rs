@@ -4,48 +4,37 @@ use std::path::PathBuf;
 
 use glam::Vec3;
 
-use super::{FINITE, LoadOptions, Loader};
+use super::{FINITE, Loader};
 use crate::{
-    EnvironmentMap, Lamp, Portal,
+    EnvironmentMap, Lamp, Scene,
     error::Result,
     file::{EnvironmentEntry, LampEntry, LampKindEntry, SceneFile},
     lamp::{LampKind, Spot},
     mesh::label,
 };
 
-/// Light of a scene apart from emitting surfaces.
-pub(super) struct Light {
-    pub(super) environment: EnvironmentMap,
-    pub(super) lamps: Vec<Lamp>,
-    /// Where it comes in.
-    pub(super) portals: Vec<Portal>,
-}
-
 impl Loader<'_> {
     /// Makes environment, lamps and portals of a scene file, with the options of the command line.
-    pub(super) fn light(
-        &self,
-        file: &SceneFile,
-        options: &LoadOptions,
-        inputs: &mut Vec<PathBuf>,
-        warnings: &mut Vec<String>,
-    ) -> Result<Light> {
+    pub(super) fn light(&self, file: &SceneFile, scene: &mut Scene) -> Result<()> {
         let lamps = file.lamps.iter().enumerate().map(|(index, entry)| self.lamp(index, entry));
-        let lamps = lamps.collect::<Result<_>>()?;
-        let environment = if let Some(map) = &options.environment {
-            inputs.push(map.clone());
-            EnvironmentMap::load(map, 1.0, options.rotation_deg.unwrap_or(0.0), warnings)?
+        let lamps = lamps.collect::<Result<Vec<_>>>()?;
+        // Those of included files come last.
+        drop(scene.lamps.splice(..0, lamps));
+        let rotation_deg = self.options.rotation_deg;
+        if let Some(map) = &self.options.environment {
+            scene.inputs.push(map.clone());
+            let rotation_deg = rotation_deg.unwrap_or(0.0);
+            scene.environment = EnvironmentMap::load(map, 1.0, rotation_deg, &mut scene.warnings)?;
         } else if let Some(entry) = &file.environment {
             let mut entry = entry.clone();
             let is_file = |map: &&PathBuf| !self.arrays.images.contains_key(*map);
             let files = entry.map.iter().filter(is_file);
-            inputs.extend(files.map(|map| self.folder.join(map)));
-            entry.rotation_deg = options.rotation_deg.unwrap_or(entry.rotation_deg);
-            self.environment(&entry, warnings)?
-        } else {
-            EnvironmentMap::constant(Vec3::ZERO, 1.0).map_err(|message| self.error(message))?
-        };
-        Ok(Light { environment, lamps, portals: self.portals(&file.portals)? })
+            scene.inputs.extend(files.map(|map| self.file(map)));
+            entry.rotation_deg = rotation_deg.unwrap_or(entry.rotation_deg);
+            scene.environment = self.environment(&entry, &mut scene.warnings)?;
+        }
+        scene.portals = self.portals(&file.portals)?;
+        Ok(())
     }
 
     fn environment(
@@ -66,7 +55,7 @@ impl Loader<'_> {
                     let map = EnvironmentMap::of_image(&name, image, scale, rotation_deg, warnings);
                     named("map", map)
                 }
-                None => EnvironmentMap::load(&self.folder.join(map), scale, rotation_deg, warnings),
+                None => EnvironmentMap::load(&self.file(map), scale, rotation_deg, warnings),
             },
             (None, Some(constant), None, None, None) => {
                 let radiance = self.vector("environment.constant", *constant, (0.0, f32::MAX))?;

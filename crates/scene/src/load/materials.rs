@@ -9,6 +9,7 @@ use glam::Vec3;
 
 use super::{FINITE, Loader, MIN_ALPHA};
 use crate::{
+    Scene,
     error::Result,
     file::{
         ChannelEntry, ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry, TextureEntry,
@@ -33,16 +34,11 @@ struct Loaded {
 type Value<T> = (T, Option<TextureUse>);
 
 impl Loader<'_> {
-    pub(super) fn materials(
-        &self,
-        entries: &[MaterialEntry],
-        inputs: &mut Vec<PathBuf>,
-        warnings: &mut Vec<String>,
-    ) -> Result<Vec<Material>> {
+    pub(super) fn materials(&self, entries: &[MaterialEntry], scene: &mut Scene) -> Result<()> {
         let mut loaded = Loaded::default();
         let mut paths = Vec::new();
         for name in entries.iter().flat_map(MaterialEntry::textures).map(|entry| &entry.texture) {
-            let path = self.folder.join(name);
+            let path = self.file(name);
             if let Some(image) = self.arrays.images.get(name) {
                 let label = path.display().to_string();
                 let texture = Texture::of_image(&label, image, &mut loaded.warnings)
@@ -54,7 +50,6 @@ impl Loader<'_> {
         }
         loaded.textures.load_all(paths, &mut loaded.warnings)?;
         let mut lines = HashMap::new();
-        let mut materials = Vec::with_capacity(entries.len());
         for entry in entries {
             let name = &entry.keys.name;
             let label = format!("material `{name}` (line {})", entry.line);
@@ -64,14 +59,14 @@ impl Loader<'_> {
             }
             let mut surface = self.surface(&label, &entry.keys, &mut loaded)?;
             let kind = self.material_kind(&label, &entry.kind, &mut surface, &mut loaded)?;
-            materials.push(Material { name: name.clone(), kind, surface });
+            scene.materials.push(Material { name: name.clone(), kind, surface });
         }
         let of_arrays: BTreeSet<_> =
-            self.arrays.images.keys().map(|name| self.folder.join(name)).collect();
-        inputs.extend(loaded.textures.files().difference(&of_arrays).cloned());
-        inputs.append(&mut loaded.inputs);
-        warnings.append(&mut loaded.warnings);
-        Ok(materials)
+            self.arrays.images.keys().map(|name| self.file(name)).collect();
+        scene.inputs.extend(loaded.textures.files().difference(&of_arrays).cloned());
+        scene.inputs.append(&mut loaded.inputs);
+        scene.warnings.append(&mut loaded.warnings);
+        Ok(())
     }
 
     /// Reads the keys that all types share.
@@ -215,7 +210,7 @@ impl Loader<'_> {
                 }
             }
             MaterialKindEntry::Measured(entry) => {
-                let path = self.folder.join(&entry.file);
+                let path = self.file(&entry.file);
                 let Loaded { measured, inputs, warnings, .. } = loaded;
                 let table = measured.table(&path, inputs, warnings)?;
                 MaterialKind::Measured { path, table }
@@ -335,7 +330,7 @@ impl Loader<'_> {
         self.check_range(&format!("{label}: {key}.scale"), &entry.scale.0, limit)?;
         self.check_range(&format!("{label}: {key}.offset"), &entry.offset, limit)?;
         self.check_range(&format!("{label}: {key}.rotate_deg"), &[entry.rotate_deg], FINITE)?;
-        let path = self.folder.join(&entry.texture);
+        let path = self.file(&entry.texture);
         let texture = loaded.textures.load(&path, &mut loaded.warnings)?;
         Ok(TextureUse {
             channels: match entry.channel {

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use glam::Vec3;
 
 use super::{
-    Asked, Camera, FilmSettings, Geometry, Scene,
+    Asked, Camera, EnvironmentMap, FilmSettings, Geometry, Scene,
     file::{CameraEntry, SceneFile},
 };
 use crate::{
@@ -27,7 +27,6 @@ use crate::{
     material::{Material, MaterialKind},
 };
 use arrays::{Arrays, NONE};
-use light::Light;
 
 pub use super::{MAX_FILM_SIDE, MIN_ALPHA};
 
@@ -76,13 +75,13 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`], and for a camera that the file does not have.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
-        let loader = Loader::new(path, options);
+        let loader = Loader { path, options, arrays: &NONE };
         if let Some(name) = &options.variant {
             let is_gltf = matches!(files::extension(path).as_str(), "gltf" | "glb");
             loader.check(is_gltf, || format!("--variant {name}: the option is for glTF files"))?;
         }
         if let Some(imported) = loader.import(options.camera.as_deref())? {
-            return loader.imported(imported, options);
+            return loader.imported(imported);
         }
         let extension = files::extension(path);
         if !matches!(extension.as_str(), "toml" | "") && path.is_file() {
@@ -114,32 +113,20 @@ impl Scene {
         arrays: &Arrays,
     ) -> Result<Self> {
         let file = SceneFile::parse(path, text)?;
-        let loader = Loader { arrays, ..Loader::new(path, options) };
+        let loader = Loader { path, options, arrays };
         if let Some(name) = &options.camera {
             let message = "a scene in .toml has one camera; the option is for glTF files";
             return Err(loader.error(format!("--camera {name}: {message}")));
         }
-        let mut warnings = Vec::new();
-        let camera = loader.camera(&viewed(&loader.camera_at(&file, options.time)?, options))?;
-        loader.check_film(&file.film)?;
-        let mut inputs = Vec::new();
-        let mut materials = loader.materials(&file.materials, &mut inputs, &mut warnings)?;
-        let mut geometry =
-            loader.geometry(&file.objects, &mut materials, &mut inputs, &mut warnings)?;
-        let mut lamps = Vec::new();
-        for entry in &file.includes {
-            let inputs = &mut inputs;
-            let warnings = &mut warnings;
-            lamps.extend(loader.include(entry, &mut materials, &mut geometry, inputs, warnings)?);
+        let mut scene = loader.scene(&loader.camera_at(&file)?, file.film)?;
+        loader.materials(&file.materials, &mut scene)?;
+        loader.geometry(&file.objects, &mut scene)?;
+        file.includes.iter().try_for_each(|entry| loader.include(entry, &mut scene))?;
+        if scene.materials.is_empty() {
+            scene.materials.push(default_material());
         }
-        if materials.is_empty() {
-            materials.push(default_material());
-        }
-        let mut light = loader.light(&file, options, &mut inputs, &mut warnings)?;
-        light.lamps.extend(lamps);
-        let mut scene = loader.scene(camera, file.film, light, materials, geometry, warnings);
-        scene.inputs.extend(inputs);
-        Ok(scene)
+        loader.light(&file, &mut scene)?;
+        Ok(loader.finished(scene))
     }
 }
 
@@ -179,61 +166,56 @@ const FINITE: (f32, f32) = (f32::MIN, f32::MAX);
 
 struct Loader<'a> {
     path: &'a Path,
-    folder: &'a Path,
-    /// Folder whose files a scene may name beside its own.
-    allowed: Option<&'a Path>,
-    /// Time at which an animation is seen, seconds.
-    time: Option<f32>,
-    /// Variant of the materials of a glTF file that is a whole scene.
-    variant: Option<&'a str>,
+    options: &'a LoadOptions,
     /// Parts of the scene that are in no file.
     arrays: &'a Arrays,
 }
 
 impl<'a> Loader<'a> {
-    fn new(path: &'a Path, options: &'a LoadOptions) -> Self {
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let (allowed, time) = (options.allow_root.as_deref(), options.time);
-        Self { path, folder, allowed, time, variant: options.variant.as_deref(), arrays: &NONE }
-    }
-
     /// Loader of another file of the same scene.
     fn beside(&self, path: &'a Path) -> Self {
-        Self { path, folder: path.parent().unwrap_or(Path::new("")), ..*self }
+        Self { path, ..*self }
     }
 
-    /// Puts the parts together; warns of a scene without any light.
-    fn scene(
-        &self,
-        camera: Camera,
-        film: FilmSettings,
-        light: Light,
-        materials: Vec<Material>,
-        geometry: Geometry,
-        mut warnings: Vec<String>,
-    ) -> Scene {
-        let is_dark = light.lamps.is_empty()
-            && materials.iter().all(|material| material.surface.emission.is_none())
-            && light.environment.is_black();
-        if is_dark {
-            warnings.push(format!("{}: no light: nothing is lit", self.path.display()));
-        }
-        let mut scene = Scene {
+    /// Path of a file that the scene names.
+    fn file(&self, name: &Path) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(name)
+    }
+
+    /// Empty scene in the dark, with checked camera and film.
+    fn scene(&self, camera: &CameraEntry, film: FilmSettings) -> Result<Scene> {
+        let camera = self.camera(&viewed(camera, self.options))?;
+        self.check_film(&film)?;
+        Ok(Scene {
             name: scene_name(self.path),
             path: self.path.to_path_buf(),
             camera,
             film,
-            environment: light.environment,
-            lamps: light.lamps,
-            portals: light.portals,
-            materials,
-            geometry,
+            environment: self.uniform_light(Vec3::ZERO)?,
+            lamps: Vec::new(),
+            portals: Vec::new(),
+            materials: Vec::new(),
+            geometry: Geometry::default(),
             inputs: vec![self.path.to_path_buf()],
             variants: Vec::new(),
             asked: Asked::default(),
-            warnings,
+            warnings: Vec::new(),
             hash: String::new(),
-        };
+        })
+    }
+
+    fn uniform_light(&self, radiance: Vec3) -> Result<EnvironmentMap> {
+        EnvironmentMap::constant(radiance, 1.0).map_err(|message| self.error(message))
+    }
+
+    /// Gives a scene its hash; warns of one without any light.
+    fn finished(&self, mut scene: Scene) -> Scene {
+        let is_dark = scene.lamps.is_empty()
+            && scene.materials.iter().all(|material| material.surface.emission.is_none())
+            && scene.environment.is_black();
+        if is_dark {
+            scene.warnings.push(format!("{}: no light: nothing is lit", self.path.display()));
+        }
         scene.hash = super::hash::hash(&scene);
         scene
     }

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::{FINITE, Loader};
 use crate::{
-    Geometry,
+    Scene,
     error::{Error, Result},
     features::{self, Ignored},
     file::{ObjectEntry, ObjectKeys, ObjectSource},
@@ -30,13 +30,7 @@ const VERTEX_BYTES: u64 = 48;
 const TRIANGLE_BYTES: u64 = 16;
 
 impl Loader<'_> {
-    pub(super) fn geometry(
-        &self,
-        objects: &[ObjectEntry],
-        materials: &mut Vec<Material>,
-        inputs: &mut Vec<PathBuf>,
-        warnings: &mut Vec<String>,
-    ) -> Result<Geometry> {
+    pub(super) fn geometry(&self, objects: &[ObjectEntry], scene: &mut Scene) -> Result<()> {
         let labelled =
             |(index, object)| (object, object_label(index, object), self.mesh_key(object));
         let objects: Vec<_> = objects.iter().enumerate().map(labelled).collect();
@@ -52,10 +46,16 @@ impl Loader<'_> {
             }
             let ObjectKeys { scale, rotate_deg, translate, .. } = &object.keys;
             self.check_transform(label, scale.0, *rotate_deg, *translate)?;
-            self.check_material(label, object, materials)?;
+            match &object.keys.material {
+                Some(name) => self.material_index(label, name, &scene.materials).map(drop)?,
+                None => self.check(matches!(object.kind, ObjectSource::Mesh(_)), || {
+                    format!("{label}: expected a material, found none")
+                })?,
+            }
             self.check_light_group(label, object.keys.light_group.as_deref())?;
             *uses.entry(key).or_default() += 1;
         }
+        let materials = &scene.materials;
         let keys = |is_asked: &dyn Fn(Option<&Material>) -> bool| -> HashSet<&PathBuf> {
             let asked = objects.iter().filter(|of| is_asked(named_material(of.0, materials)));
             asked.map(|(_, _, key)| key).collect()
@@ -68,6 +68,8 @@ impl Loader<'_> {
         // Read all meshes before placing any, so that the arrays are allocated once.
         let mut meshes = HashMap::new();
         let mut shape_triangles = 0;
+        let mut budget = Budget::default();
+        let mut repeated = HashSet::new();
         for (object, label, key) in &objects {
             if !meshes.contains_key(key) {
                 let mesh = match &object.kind {
@@ -77,17 +79,19 @@ impl Loader<'_> {
                             .map_err(|message| self.error(format!("{label}: {message}")))?;
                         if !mesh.colors.is_empty() && !colored.contains(key) {
                             let remedy = "the material has no `vertex_color = true`";
-                            warnings.push(format!("{label}: ignored the vertex colours: {remedy}"));
+                            let warning = "ignored the vertex colours";
+                            scene.warnings.push(format!("{label}: {warning}: {remedy}"));
                             mesh.colors.clear();
                         }
                         mesh
                     }
                     ObjectSource::Mesh(_) => {
-                        let mut mesh = Mesh::read_at(key, self.time, None, None, warnings)?;
+                        let (time, warnings) = (self.options.time, &mut scene.warnings);
+                        let mut mesh = Mesh::read_at(key, time, None, None, warnings)?;
                         // The object of the scene is one, whatever parts its file has.
                         mesh.objects.clear();
-                        inputs.push(key.clone());
-                        inputs.extend_from_slice(&mesh.side_files);
+                        scene.inputs.push(key.clone());
+                        scene.inputs.extend_from_slice(&mesh.side_files);
                         let mut ignored = ignored_in_object(&mesh, own_materials.contains(key));
                         let is_ply = crate::files::extension(key) == "ply";
                         if is_ply && !mesh.colors.is_empty() && !colored.contains(key) {
@@ -110,25 +114,17 @@ impl Loader<'_> {
                         mesh
                     }
                 };
+                let copies = uses[key];
+                if copies > 1 && budget.takes_instances(copies, mesh.triangles.len()) {
+                    repeated.insert(key);
+                }
                 meshes.insert(key, mesh);
-            }
-        }
-        let mut budget = Budget::default();
-        let mut repeated = HashSet::new();
-        let mut seen = HashSet::new();
-        for (_, _, key) in &objects {
-            let copies = uses.get(key).copied().unwrap_or(0);
-            if copies > 1
-                && seen.insert(key)
-                && budget.takes_instances(copies, meshes[key].triangles.len())
-            {
-                repeated.insert(key);
             }
         }
         let (mut vertices, mut triangles, mut shape_triangles) = (0_usize, 0_usize, 0);
         for (object, label, key) in &objects {
             let mesh = &meshes[key];
-            if repeated.contains(key) && !emits(object, mesh, materials) {
+            if repeated.contains(key) && !emits(object, mesh, &scene.materials) {
                 continue;
             }
             let count = mesh.triangles.len();
@@ -141,38 +137,37 @@ impl Loader<'_> {
         }
         self.check_counts(vertices, triangles)?;
         let mut prototypes: HashMap<&PathBuf, Prototype> = HashMap::new();
-        let mut geometry = Geometry::default();
+        let geometry = &mut scene.geometry;
         geometry.positions.reserve_exact(vertices);
         geometry.normals.reserve_exact(vertices);
         geometry.triangles.reserve_exact(triangles);
         geometry.materials.reserve_exact(triangles);
         for (object, label, key) in &objects {
             let mesh = &meshes[key];
-            let is_instance = repeated.contains(key) && !emits(object, mesh, materials);
+            let is_instance = repeated.contains(key) && !emits(object, mesh, &scene.materials);
             if is_instance && !prototypes.contains_key(key) {
                 let own = |triangle| run_material(mesh, triangle) as u32;
-                let (prototype, dropped) = geometry.add_prototype(mesh, own);
-                warnings.extend(dropped.warnings(label, mesh.triangles.len()));
+                let (prototype, dropped) = scene.geometry.add_prototype(mesh, own);
+                scene.warnings.extend(dropped.warnings(label, mesh.triangles.len()));
                 prototypes.insert(key, prototype);
             }
             let prototype = prototypes.get(key).copied().filter(|_| is_instance);
-            self.place(label, object, mesh, prototype, &mut geometry, materials, warnings)?;
+            self.place(label, object, mesh, prototype, scene)?;
             // Drop a mesh after its last use, so that a large one is not held twice for long.
-            let left = uses.get_mut(key).map_or(0, |left| {
+            if let Some(left) = uses.get_mut(key) {
                 *left -= 1;
-                *left
-            });
-            if left == 0 {
-                meshes.remove(key);
+                if *left == 0 {
+                    meshes.remove(key);
+                }
             }
         }
-        Ok(geometry)
+        Ok(())
     }
 
     /// Key that tells meshes apart: the path of a mesh file or the parameters of a shape.
     fn mesh_key(&self, object: &ObjectEntry) -> PathBuf {
         match &object.kind {
-            ObjectSource::Mesh(mesh) => self.folder.join(mesh),
+            ObjectSource::Mesh(mesh) => self.file(mesh),
             ObjectSource::Shape { shape, .. } => PathBuf::from(format!("{shape:?}")),
         }
     }
@@ -210,20 +205,6 @@ impl Loader<'_> {
         memory::check(asker, vertex_bytes.saturating_add(triangle_bytes)).map_err(Error::memory)
     }
 
-    fn check_material(
-        &self,
-        label: &str,
-        object: &ObjectEntry,
-        materials: &[Material],
-    ) -> Result<()> {
-        match &object.keys.material {
-            Some(name) => self.material_index(label, name, materials).map(drop),
-            None => self.check(matches!(object.kind, ObjectSource::Mesh(_)), || {
-                format!("{label}: expected a material, found none")
-            }),
-        }
-    }
-
     /// Finds a material of the scene by its name.
     pub(super) fn material_index(
         &self,
@@ -257,16 +238,13 @@ impl Loader<'_> {
 
     /// Appends an object to the geometry, as an instance of `prototype` or placed, with the materials
     /// of its mesh file if it names none.
-    #[expect(clippy::too_many_arguments, reason = "an object and all that it adds to")]
     fn place(
         &self,
         label: &str,
         object: &ObjectEntry,
         mesh: &Mesh,
         prototype: Option<Prototype>,
-        geometry: &mut Geometry,
-        materials: &mut Vec<Material>,
-        warnings: &mut Vec<String>,
+        Scene { geometry, materials, warnings, .. }: &mut Scene,
     ) -> Result<()> {
         geometry.start_object(object.keys.name.as_deref().unwrap_or(label));
         let transform =

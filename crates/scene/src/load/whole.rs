@@ -37,8 +37,8 @@ impl Loader<'_> {
     /// Reads the mesh file at the loader's path as a whole scene, with the camera that is named.
     pub(super) fn whole(&self, camera: Option<&str>) -> Result<Imported> {
         let mut warnings = Vec::new();
-        let budget = Some(Budget::default());
-        let mesh = Mesh::read_at(self.path, self.time, self.variant, budget, &mut warnings)?;
+        let (variant, budget) = (self.options.variant.as_deref(), Some(Budget::default()));
+        let mesh = Mesh::read_at(self.path, self.options.time, variant, budget, &mut warnings)?;
         let mut ignored = mesh.ignored_in_materials(|_| false);
         let chosen = self.choose_camera(&mesh.cameras, camera, &mut ignored)?;
         let (materials, geometry) = self.place_whole(&mesh, &mut ignored, &mut warnings)?;
