@@ -45,49 +45,40 @@ impl Loader<'_> {
         let (scale, rotation_deg) = (entry.scale, entry.rotation_deg);
         self.check_range("environment.scale", &[scale], (0.0, f32::MAX))?;
         self.check_range("environment.rotation_deg", &[rotation_deg], FINITE)?;
-        let named = |name: &str, map: Result<EnvironmentMap, String>| {
-            map.map_err(|message| self.error(format!("environment.{name}: {message}")))
+        let sources = [
+            ("map", entry.map.is_some()),
+            ("constant", entry.constant.is_some()),
+            ("court", entry.court.is_some()),
+            ("sky", entry.sky.is_some()),
+            ("daylight", entry.daylight.is_some()),
+        ];
+        let found: Vec<_> =
+            sources.iter().filter(|source| source.1).map(|(name, _)| *name).collect();
+        let [name] = found[..] else {
+            let found = if found.is_empty() { "none".to_owned() } else { found.join(" and ") };
+            return Err(self.error(format!(
+                "environment: expected exactly one of map, constant, court, sky, daylight, found \
+                 {found}"
+            )));
         };
-        match (&entry.map, &entry.constant, &entry.court, &entry.sky, &entry.daylight) {
-            (Some(map), None, None, None, None) => match self.arrays.images.get(map) {
-                Some(image) => {
-                    let name = map.display().to_string();
-                    let map = EnvironmentMap::of_image(&name, image, scale, rotation_deg, warnings);
-                    named("map", map)
-                }
-                None => EnvironmentMap::load(&self.file(map), scale, rotation_deg, warnings),
-            },
-            (None, Some(constant), None, None, None) => {
-                let radiance = self.vector("environment.constant", *constant, (0.0, f32::MAX))?;
-                named("constant", EnvironmentMap::constant(radiance, scale))
-            }
-            (None, None, Some(court), None, None) => {
-                named("court", EnvironmentMap::court(court, scale, rotation_deg))
-            }
-            (None, None, None, Some(sky), None) => {
-                named("sky", EnvironmentMap::sky(sky, scale, rotation_deg))
-            }
-            (None, None, None, None, Some(daylight)) => {
-                named("daylight", EnvironmentMap::daylight(daylight, scale, rotation_deg))
-            }
-            (map, constant, court, sky, daylight) => {
-                let found: Vec<_> = [
-                    ("map", map.is_some()),
-                    ("constant", constant.is_some()),
-                    ("court", court.is_some()),
-                    ("sky", sky.is_some()),
-                    ("daylight", daylight.is_some()),
-                ]
-                .into_iter()
-                .filter_map(|(name, is_there)| is_there.then_some(name))
-                .collect();
-                let found = if found.is_empty() { "none".to_owned() } else { found.join(" and ") };
-                Err(self.error(format!(
-                    "environment: expected exactly one of map, constant, court, sky, daylight, found \
-                     {found}"
-                )))
-            }
-        }
+        let made = if let Some(map) = &entry.map {
+            let Some(image) = self.arrays.images.get(map) else {
+                return EnvironmentMap::load(&self.file(map), scale, rotation_deg, warnings);
+            };
+            let name = map.display().to_string();
+            EnvironmentMap::of_image(&name, image, scale, rotation_deg, warnings)
+        } else if let Some(court) = &entry.court {
+            EnvironmentMap::court(court, scale, rotation_deg)
+        } else if let Some(sky) = &entry.sky {
+            EnvironmentMap::sky(sky, scale, rotation_deg)
+        } else if let Some(daylight) = &entry.daylight {
+            EnvironmentMap::daylight(daylight, scale, rotation_deg)
+        } else {
+            let constant = entry.constant.unwrap_or_default();
+            let constant = self.vector("environment.constant", constant, (0.0, f32::MAX))?;
+            EnvironmentMap::constant(constant, scale)
+        };
+        made.map_err(|message| self.error(format!("environment.{name}: {message}")))
     }
 
     fn lamp(&self, index: usize, entry: &LampEntry) -> Result<Lamp> {
