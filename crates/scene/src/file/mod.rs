@@ -19,7 +19,7 @@ use toml::Spanned;
 pub(crate) use lamp::{LampEntry, LampKeys, LampKindEntry};
 pub(crate) use material::{ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry};
 pub(crate) use portal::PortalKeys;
-pub(crate) use value::{ChannelEntry, NumberOrVector, TextureEntry, Textured};
+pub(crate) use value::{NumberOrVector, TextureEntry, Textured};
 
 use super::{
     FilmSettings,

@@ -8,7 +8,7 @@ use serde::{
     de::{self, MapAccess, SeqAccess, Unexpected, Visitor, value},
 };
 
-use crate::texture::{Interpolation, Wrap};
+use crate::texture::{Channels, Interpolation, Wrap};
 
 /// One number for all axes, or one per axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,7 +80,7 @@ pub(crate) struct TextureEntry {
     #[serde(default)]
     pub interpolation: Interpolation,
     /// Channel that is read; all three colours without, and their luminance for a number.
-    pub channel: Option<ChannelEntry>,
+    pub channel: Option<Channels>,
     /// True for values as they are stored, false for colours in sRGB. Default: false for colours,
     /// true for numbers and normals; HDR and EXR images are always linear.
     pub linear: Option<bool>,
@@ -88,15 +88,6 @@ pub(crate) struct TextureEntry {
     pub factor: Option<NumberOrVector>,
     /// Factor of the slopes of a normal map; in `normal` only, which has no `factor`. Default: 1.
     pub strength: Option<f32>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum ChannelEntry {
-    R,
-    G,
-    B,
-    A,
 }
 
 /// A value that is the same everywhere, or a texture.

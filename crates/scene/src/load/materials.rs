@@ -12,12 +12,11 @@ use crate::{
     Scene,
     error::Result,
     file::{
-        ChannelEntry, ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry, TextureEntry,
-        Textured,
+        ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry, TextureEntry, Textured,
     },
     material::{ConductorFresnel, Emission, Material, MaterialKind, Opacity, Principled, Surface},
     measured::MeasuredFiles,
-    texture::{Channels, Encoding, Texture, TextureCache, TextureUse},
+    texture::{Encoding, Texture, TextureCache, TextureUse},
     transform::sine_cosine_deg,
 };
 
@@ -333,13 +332,7 @@ impl Loader<'_> {
         let path = self.file(&entry.texture);
         let texture = loaded.textures.load(&path, &mut loaded.warnings)?;
         Ok(TextureUse {
-            channels: match entry.channel {
-                None => Channels::Color,
-                Some(ChannelEntry::R) => Channels::Red,
-                Some(ChannelEntry::G) => Channels::Green,
-                Some(ChannelEntry::B) => Channels::Blue,
-                Some(ChannelEntry::A) => Channels::Alpha,
-            },
+            channels: entry.channel.unwrap_or_default(),
             encoding: match entry.linear {
                 None => encoding,
                 Some(true) => Encoding::Linear,

@@ -74,18 +74,23 @@ pub enum Interpolation {
 }
 
 /// Channels that a property reads.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 pub enum Channels {
     /// Red, green and blue; their luminance for a property that is one number.
     #[default]
+    #[serde(skip)]
     Color,
     /// Red for all.
+    #[serde(rename = "r")]
     Red,
     /// Green for all.
+    #[serde(rename = "g")]
     Green,
     /// Blue for all.
+    #[serde(rename = "b")]
     Blue,
     /// Opacity for all.
+    #[serde(rename = "a")]
     Alpha,
 }
 
