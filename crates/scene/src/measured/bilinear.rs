@@ -4,10 +4,10 @@
 /// Place in a grid: the node before it, and how far it is from there, 0…1.
 #[derive(Clone, Copy)]
 pub(super) struct Cell {
-    column: usize,
-    row: usize,
-    x: f64,
-    y: f64,
+    pub(super) column: usize,
+    pub(super) row: usize,
+    pub(super) x: f64,
+    pub(super) y: f64,
 }
 
 impl Cell {

@@ -210,19 +210,8 @@ impl AdaptiveBrdf {
         let square =
             |theta: f64, phi: f64| [(theta / FRAC_PI_2).sqrt(), ((phi + PI) / TAU).rem_euclid(1.0)];
         let normal = square(theta_m, phi_m - turn);
-        let (phi_lower, phi_share) = interval(&self.phi, phi_i);
-        let (theta_lower, theta_share) = interval(&self.theta, theta_i);
-        let mut slices = [(0, 0.0); 4];
-        for (corner, slice) in slices.iter_mut().enumerate() {
-            let (of_phi, of_theta) = (corner / 2, corner % 2);
-            let weight = |upper: usize, share: f64| if upper == 1 { share } else { 1.0 - share };
-            let phi = (phi_lower + of_phi).min(self.phi.len() - 1);
-            let theta = (theta_lower + of_theta).min(self.theta.len() - 1);
-            *slice = (
-                phi * self.theta.len() + theta,
-                weight(of_phi, phi_share) * weight(of_theta, theta_share),
-            );
-        }
+        let ((row, y), (column, x)) = (interval(&self.phi, phi_i), interval(&self.theta, theta_i));
+        let slices = Cell { column, row, x, y }.nodes(self.theta.len());
         let slices = slices.into_iter().filter(|slice| slice.1 > 0.0);
         let mixed = |number: &dyn Fn(&Density) -> f32| -> f64 {
             let weighted = |(slice, weight)| weight * f64::from(number(&self.slices[slice]));
