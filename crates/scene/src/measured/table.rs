@@ -165,18 +165,14 @@ impl MeasuredTable {
                 (MEASURED_DENSITY_OFFSET, &row.density),
             ] {
                 let target = &mut words[offset as usize + first..][..values.len()];
-                for (word, value) in target.iter_mut().zip(values) {
-                    *word = value.to_bits();
-                }
+                target.copy_from_slice(bytemuck::cast_slice(values));
             }
         }
         let albedo: Vec<Vec3> = (0..BRDF_COSINE_NODES)
             .into_par_iter()
             .map(|node| directional_albedo(&words, node as f32 / BRDF_COSINE_INTERVALS as f32))
             .collect();
-        for (word, value) in words.iter_mut().zip(albedo.iter().flat_map(Vec3::to_array)) {
-            *word = value.to_bits();
-        }
+        words[..3 * albedo.len()].copy_from_slice(bytemuck::cast_slice(&albedo));
         Ok(Self { words, invalid_cell_count, warnings, rgl: None })
     }
 
