@@ -7,9 +7,9 @@ use super::{GltfReader, contents::ignore_extensions, glossiness};
 use crate::{
     error::Result,
     features::{self, Feature, Ignored},
-    gloss::metallic_roughness,
+    gloss::{DIELECTRIC, metallic_roughness},
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
-    mesh::{MeshMaterial, images, label},
+    mesh::{DEFAULT_IOR, IOR_RANGE, MeshMaterial, images, label},
     texture::{Channels, Encoding, TextureUse, texelwise::lie_alike},
 };
 
@@ -25,11 +25,6 @@ const VECTOR: (Channels, Encoding) = (Channels::Color, Encoding::Linear);
 const GLASS: f32 = 0.5;
 /// Roughness from which a thin pane, which is always smooth, is worth a warning.
 const VISIBLE_ROUGHNESS: f32 = 0.05;
-/// Refractive indices of coats and glass.
-const IOR_RANGE: (f32, f32) = (1.01, 4.0);
-/// Refractive index of a material that states none, and its reflectance at normal incidence.
-const DEFAULT_IOR: f32 = 1.5;
-const DEFAULT_REFLECTANCE: f32 = 0.04;
 /// Largest reflectance at normal incidence of a material that is read as a dielectric.
 const STRONGEST_DIELECTRIC: f32 = 0.08;
 
@@ -220,8 +215,8 @@ impl GltfReader<'_> {
         let specular_color = Vec3::from_array(vector(specular, "specularColorFactor", [1.0; 3]));
         // The index 0 stands for an infinite one: all light is reflected before the factors.
         let (ior, whole) = match stated_ior {
-            0.0 => (DEFAULT_IOR, DEFAULT_REFLECTANCE.recip()),
-            ior => (ior.clamp(IOR_RANGE.0, IOR_RANGE.1), 1.0),
+            0.0 => (DEFAULT_IOR, DIELECTRIC.recip()),
+            ior => (ior.clamp(*IOR_RANGE.start(), *IOR_RANGE.end()), 1.0),
         };
         let base_color = color(pbr, "baseColorFactor", [1.0; 3]);
         let kind = MaterialKind::Principled(Principled {
@@ -269,12 +264,12 @@ impl GltfReader<'_> {
         }
         let specular = specular.filter(|_| lie_alike);
         if specular.is_none() && specular_color.max_element() <= STRONGEST_DIELECTRIC {
-            let specular_color = specular_color / DEFAULT_REFLECTANCE;
-            let principled = Principled { base_color, roughness, ..Principled::default() };
             let kind = MaterialKind::Principled(Principled {
+                base_color,
                 metallic: 0.0,
-                specular_color,
-                ..principled
+                roughness,
+                specular_color: specular_color / DIELECTRIC,
+                ..Principled::default()
             });
             return Ok(Reflection { kind, surface, base_color, alpha });
         }

@@ -103,14 +103,12 @@ pub fn read(
     warnings.extend(ignored);
     mesh.part_coincident(path, warnings);
     mesh.complete_tangents(-1.0);
-    let mut repeated = std::mem::take(&mut mesh.repeated);
-    for part in &mut repeated {
+    for part in &mut mesh.repeated {
         // Tangents depend on the materials, which the whole has.
         std::mem::swap(&mut part.mesh.materials, &mut mesh.materials);
         part.mesh.complete_tangents(-1.0);
         std::mem::swap(&mut part.mesh.materials, &mut mesh.materials);
     }
-    mesh.repeated = repeated;
     Ok(mesh)
 }
 

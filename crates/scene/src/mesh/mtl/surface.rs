@@ -7,16 +7,12 @@ use crate::{
     features::{self, Feature},
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
     mesh::{
-        MeshMaterial,
+        DEFAULT_IOR, IOR_RANGE, MeshMaterial,
         images::{Images, has_alpha, holds_normals},
     },
     texture::{Channels, Encoding},
 };
 
-/// Refractive index of a material that states none, or one that a coat cannot have.
-const DEFAULT_IOR: f32 = 1.5;
-/// Refractive indices of coats and glass.
-const IOR_RANGE: std::ops::RangeInclusive<f32> = 1.01..=4.0;
 /// Roughness of a material that states no more than its metallic share.
 const DEFAULT_ROUGHNESS: f32 = 0.5;
 /// Opacity below which glass is a pane, and not a coat on a base that lets some light through.
