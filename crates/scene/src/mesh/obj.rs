@@ -60,30 +60,25 @@ fn for_each_line(
     mut use_line: impl FnMut(usize, &str) -> Result<()>,
 ) -> Result<()> {
     let mut bytes = Vec::new();
-    let mut number = 0;
-    loop {
-        bytes.clear();
-        let first_line = number + 1;
-        loop {
-            let read = reader
-                .read_until(b'\n', &mut bytes)
-                .map_err(|source| Error::io(path, "read", source))?;
-            number += 1;
-            while matches!(bytes.last(), Some(b'\n' | b'\r')) {
-                bytes.pop();
-            }
-            if read > 0 && bytes.last() == Some(&b'\\') {
-                bytes.pop();
-                bytes.push(b' ');
-                continue;
-            }
-            if read == 0 && bytes.is_empty() {
-                return Ok(());
-            }
-            break;
+    let mut first_line = 1;
+    for next_line in 2.. {
+        let read = reader
+            .read_until(b'\n', &mut bytes)
+            .map_err(|source| Error::io(path, "read", source))?;
+        while matches!(bytes.last(), Some(b'\n' | b'\r')) {
+            bytes.pop();
         }
-        use_line(first_line, &String::from_utf8_lossy(&bytes))?;
+        match bytes.last_mut() {
+            Some(last) if read > 0 && *last == b'\\' => *last = b' ',
+            None if read == 0 => break,
+            _ => {
+                use_line(first_line, &String::from_utf8_lossy(&bytes))?;
+                bytes.clear();
+                first_line = next_line;
+            }
+        }
     }
+    Ok(())
 }
 
 /// Position, texture coordinates and normal that a face uses together, linked to the next of the same
