@@ -167,16 +167,11 @@ impl<R: BufRead> Source<'_, R> {
         let colors =
             COLOR_NAMES.map(|[r, g, b, a]| Some(([column(r)?, column(g)?, column(b)?], column(a))));
         let colors = colors.into_iter().flatten().next();
-        mesh.positions.reserve_exact(element.count as usize);
-        if colors.is_some() {
-            mesh.colors.reserve_exact(element.count as usize);
-        }
-        if has_normals {
-            mesh.normals.reserve_exact(element.count as usize);
-        }
-        if uvs.is_some() {
-            mesh.uvs[0].reserve_exact(element.count as usize);
-        }
+        let room = |is_there: bool| if is_there { element.count as usize } else { 0 };
+        mesh.positions.reserve_exact(room(true));
+        mesh.colors.reserve_exact(room(colors.is_some()));
+        mesh.normals.reserve_exact(room(has_normals));
+        mesh.uvs[0].reserve_exact(room(uvs.is_some()));
         let mut row = vec![0.0_f64; element.properties.len()];
         for index in 0..element.count {
             for (property, value) in element.properties.iter().zip(&mut row) {
@@ -194,14 +189,13 @@ impl<R: BufRead> Source<'_, R> {
                 mesh.normals.push(vector(normals));
             }
             if let Some((columns, opacity)) = colors {
-                let number = |column: usize| match element.properties[column].value.largest() {
-                    Some(largest) => {
-                        ((row[column] / largest) as f32, srgb_to_linear as fn(f32) -> f32)
-                    }
-                    None => (row[column] as f32, std::convert::identity as fn(f32) -> f32),
+                let number = |column: usize, decode: fn(f32) -> f32| {
+                    let largest = element.properties[column].value.largest();
+                    largest.map_or(row[column] as f32, |most| decode((row[column] / most) as f32))
                 };
-                let [r, g, b] = columns.map(number).map(|(value, decode)| decode(value));
-                mesh.colors.push([r, g, b, opacity.map_or(1.0, |column| number(column).0)]);
+                let [r, g, b] = columns.map(|column| number(column, srgb_to_linear));
+                let opacity = opacity.map_or(1.0, |column| number(column, |share| share));
+                mesh.colors.push([r, g, b, opacity]);
             }
             if let Some(columns) = uvs {
                 mesh.uvs[0].push(columns.map(|column| row[column] as f32));
