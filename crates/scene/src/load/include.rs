@@ -73,9 +73,7 @@ impl Loader<'_> {
             }
             lamps.iter_mut().for_each(|lamp| lamp.light_group = Some(group.clone()));
         }
-        let vertices = geometry.positions.len() + placed.positions.len();
-        let triangles = geometry.triangles.len() + placed.triangles.len();
-        self.check_counts(vertices, triangles)?;
+        self.check_counts(geometry, placed.positions.len(), placed.triangles.len())?;
         let first_vertex = geometry.positions.len();
         let count = placed.triangle_count() as usize;
         for start in &mut placed.objects {
@@ -133,9 +131,8 @@ impl Loader<'_> {
             if materials[first_material as usize].surface.emission.is_some() {
                 // A material of the scene may emit in place of one of the file that does not.
                 let mesh = std::mem::take(&mut geometry.prototypes[prototype as usize]);
-                let vertices = geometry.positions.len() + mesh.positions.len();
                 let checked =
-                    self.check_counts(vertices, geometry.triangles.len() + mesh.triangles.len());
+                    self.check_counts(geometry, mesh.positions.len(), mesh.triangles.len());
                 if checked.is_ok() {
                     geometry.place_instance(&moved, &mesh);
                 }
@@ -189,20 +186,16 @@ impl Loader<'_> {
 /// file as before, and as surfaces that emit do.
 fn place_lamp(mut lamp: Lamp, transform: &Transform) -> Lamp {
     let area = transform.linear.determinant().abs().powf(2.0 / 3.0);
-    let turn = |direction: &mut Vec3| {
+    if let LampKind::Point { position, intensity }
+    | LampKind::Spot(Spot { position, intensity, .. }) = &mut lamp.kind
+    {
+        *position = transform.position(position.to_array()).into();
+        *intensity *= area;
+    }
+    if let LampKind::Spot(Spot { direction, .. }) | LampKind::Directional { direction, .. } =
+        &mut lamp.kind
+    {
         *direction = (transform.linear * *direction).normalize_or(*direction);
-    };
-    match &mut lamp.kind {
-        LampKind::Point { position, intensity } => {
-            *position = transform.position(position.to_array()).into();
-            *intensity *= area;
-        }
-        LampKind::Spot(Spot { position, direction, intensity, .. }) => {
-            *position = transform.position(position.to_array()).into();
-            *intensity *= area;
-            turn(direction);
-        }
-        LampKind::Directional { direction, .. } => turn(direction),
     }
     lamp
 }

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::{FINITE, Loader};
 use crate::{
-    Scene,
+    Geometry, Scene,
     error::{Error, Result},
     features::{self, Ignored},
     file::{ObjectEntry, ObjectKeys, ObjectSource},
@@ -135,7 +135,7 @@ impl Loader<'_> {
                 self.check_shapes(label, shape_triangles)?;
             }
         }
-        self.check_counts(vertices, triangles)?;
+        self.check_counts(&scene.geometry, vertices, triangles)?;
         let mut prototypes: HashMap<&PathBuf, Prototype> = HashMap::new();
         let geometry = &mut scene.geometry;
         geometry.positions.reserve_exact(vertices);
@@ -191,8 +191,16 @@ impl Loader<'_> {
         })
     }
 
-    /// Checks that 32-bit indices address everything, and that there is memory for it.
-    pub(super) fn check_counts(&self, vertices: usize, triangles: usize) -> Result<()> {
+    /// Checks that 32-bit indices address everything if further vertices and triangles come, and that there
+    /// is memory for it.
+    pub(super) fn check_counts(
+        &self,
+        geometry: &Geometry,
+        vertices: usize,
+        triangles: usize,
+    ) -> Result<()> {
+        let vertices = geometry.positions.len() + vertices;
+        let triangles = geometry.triangles.len() + triangles;
         self.check(u32::try_from(vertices).is_ok() && u32::try_from(triangles).is_ok(), || {
             format!(
                 "{vertices} vertices and {triangles} triangles, at most {} can be used",
@@ -289,8 +297,7 @@ impl Loader<'_> {
             self.check_extent(label, prototype.corners(&instance))?;
             geometry.instances.push(instance);
         } else {
-            let vertices = first_vertex + mesh.positions.len();
-            self.check_counts(vertices, geometry.triangles.len() + of)?;
+            self.check_counts(geometry, mesh.positions.len(), of)?;
             let dropped = match named {
                 Some(material) => geometry.append(mesh, &transform, |_| material as u32),
                 None => geometry.append(mesh, &transform, |triangle| {

@@ -196,9 +196,7 @@ impl Loader<'_> {
             match instance.filter(|_| !emits) {
                 Some(instance) => geometry.instances.push(instance),
                 None => {
-                    let vertices = geometry.positions.len() + mesh.positions.len();
-                    let triangles = geometry.triangles.len() + mesh.triangles.len();
-                    self.check_counts(vertices, triangles)?;
+                    self.check_counts(geometry, mesh.positions.len(), mesh.triangles.len())?;
                     dropped.add(geometry.append(mesh, &transform, |_| material));
                 }
             }
