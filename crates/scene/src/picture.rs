@@ -5,7 +5,7 @@
 //! sorted by name, so readers look them up by name.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs::File,
     io::{self, BufRead, BufReader, BufWriter, Cursor, Read, Seek, SeekFrom, Write},
     path::Path,
@@ -167,14 +167,9 @@ impl Image {
 
     /// Names of the layers: the parts of channel names before their last dot, "" for the picture.
     pub fn layers(&self) -> Vec<&str> {
-        let mut names: Vec<&str> = self
-            .channels
-            .keys()
-            .map(|name| name.rsplit_once('.').map_or("", |split| split.0))
-            .collect();
-        names.sort_unstable();
-        names.dedup();
-        names
+        let splits = self.channels.keys().map(|name| name.rsplit_once('.'));
+        let names: BTreeSet<&str> = splits.map(|split| split.map_or("", |split| split.0)).collect();
+        names.into_iter().collect()
     }
 
     /// Returns a layer of colours (R, G, B), vectors (X, Y, Z) or single values (Y) as a picture.
@@ -310,7 +305,6 @@ impl Image {
     /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it is no OpenEXR file, is
     /// truncated or corrupt, or holds only deep data.
     pub fn read_exr(path: &Path) -> Result<Self> {
-        let open = || open_regular(path);
         let malformed = |error: exr::error::Error| match error {
             exr::error::Error::Io(source)
                 if source.kind() != io::ErrorKind::UnexpectedEof
@@ -323,7 +317,7 @@ impl Image {
             }
             other => Error::format(path, format!("not a complete OpenEXR file: {other}")),
         };
-        let file = open()?;
+        let file = open_regular(path)?;
         let file_bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
         let meta_data = exr::meta::MetaData::read_from_buffered(BufReader::new(file), false)
             .map_err(malformed)?;
@@ -344,7 +338,7 @@ impl Image {
             .all_channels()
             .first_valid_layer()
             .all_attributes()
-            .from_buffered(BufReader::new(open()?))
+            .from_buffered(BufReader::new(open_regular(path)?))
             .map_err(malformed)?;
         Self::from_layer(path, image)
     }
