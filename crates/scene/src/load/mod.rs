@@ -185,7 +185,11 @@ impl<'a> Loader<'a> {
     /// Empty scene in the dark, with checked camera and film.
     fn scene(&self, camera: &CameraEntry, film: FilmSettings) -> Result<Scene> {
         let camera = self.camera(&viewed(camera, self.options))?;
-        self.check_film(&film)?;
+        for (name, side) in [("width", film.width), ("height", film.height)] {
+            self.check((1..=MAX_FILM_SIDE).contains(&side), || {
+                format!("film.{name}: expected 1 to {MAX_FILM_SIDE} pixels, found {side}")
+            })?;
+        }
         Ok(Scene {
             name: scene_name(self.path),
             path: self.path.to_path_buf(),
@@ -279,14 +283,5 @@ impl<'a> Loader<'a> {
             aperture_radius: entry.aperture_radius,
             focus_distance,
         })
-    }
-
-    fn check_film(&self, film: &FilmSettings) -> Result<()> {
-        for (name, side) in [("width", film.width), ("height", film.height)] {
-            self.check((1..=MAX_FILM_SIDE).contains(&side), || {
-                format!("film.{name}: expected 1 to {MAX_FILM_SIDE} pixels, found {side}")
-            })?;
-        }
-        Ok(())
     }
 }
