@@ -8,7 +8,7 @@ use std::{
 
 use glam::Vec4;
 
-use crate::texture::{Encoding, Texels, Texture, TextureCache};
+use crate::texture::{Channels, Encoding, Texels, Texture, TextureCache, TextureUse};
 
 /// Texels that tell of an image whether it holds normals.
 const TEXELS_LOOKED_AT: usize = 4096;
@@ -54,6 +54,12 @@ pub(crate) fn has_alpha(texture: &Texture) -> bool {
         Texels::Shorts(texels) => texels.iter().any(|texel| texel[3] < u16::MAX),
         Texels::Halves(texels) => texels.iter().any(|texel| texel[3].to_f32() < 1.0),
     }
+}
+
+/// Opacity of a colour image, if any texel lets light through.
+pub(super) fn opacity_of(color: &TextureUse) -> Option<TextureUse> {
+    let (channels, encoding) = (Channels::Alpha, Encoding::Linear);
+    has_alpha(&color.texture).then(|| TextureUse { channels, encoding, ..color.clone() })
 }
 
 /// Tests for texels that are vectors of about unit length, along +z on the mean, as those of normal maps.

@@ -9,7 +9,7 @@ use crate::{
     features::{self, Feature, Ignored},
     gloss::{DIELECTRIC, metallic_roughness},
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
-    mesh::{DEFAULT_IOR, IOR_RANGE, MeshMaterial, images, label},
+    mesh::{DEFAULT_IOR, IOR_RANGE, MeshMaterial, images::opacity_of, label},
     texture::{Channels, Encoding, TextureUse, texelwise::lie_alike},
 };
 
@@ -297,13 +297,8 @@ impl GltfReader<'_> {
     /// Surface with a texture of colour and opacity.
     fn colored(&mut self, info: &Value, reading: &mut Reading) -> Result<Surface> {
         let color = self.texture(info, COLOR, reading)?;
-        let opacity = color.as_ref().filter(|color| images::has_alpha(&color.texture));
-        let opacity = opacity.map(|color| TextureUse {
-            channels: ALPHA.0,
-            encoding: ALPHA.1,
-            ..color.clone()
-        });
-        let opacity = Opacity { texture: opacity, ..Opacity::default() };
+        let texture = color.as_ref().and_then(opacity_of);
+        let opacity = Opacity { texture, ..Opacity::default() };
         Ok(Surface { color, opacity, ..Surface::default() })
     }
 

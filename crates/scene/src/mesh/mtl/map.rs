@@ -1,10 +1,10 @@
 //! Statements of MTL that name an image: `map_Kd -s 2 2 -clamp on wood.png`.
 
-use std::{path::PathBuf, sync::Arc};
+use std::path::PathBuf;
 
 use crate::{
     mesh::images::Images,
-    texture::{Channels, Encoding, Texture, TextureUse, Wrap},
+    texture::{Channels, Encoding, TextureUse, Wrap},
 };
 
 pub(super) struct Map {
@@ -114,7 +114,7 @@ pub(super) fn parse(text: &str) -> (&str, Options, Vec<&str>) {
 }
 
 impl Map {
-    /// Reads the image; `channels` are those without `-imfchan`, which colours ignore.
+    /// Reads channels of the image.
     pub(super) fn load(
         &self,
         channels: Channels,
@@ -123,18 +123,8 @@ impl Map {
         warnings: &mut Vec<String>,
     ) -> Option<TextureUse> {
         let texture = images.load(&self.path, &self.place, warnings)?;
-        Some(self.reading(texture, channels, encoding))
-    }
-
-    /// Reads channels of an image that has been loaded.
-    pub(super) fn reading(
-        &self,
-        texture: Arc<Texture>,
-        channels: Channels,
-        encoding: Encoding,
-    ) -> TextureUse {
         let Options { scale, offset, clamps, base_gain: [base, gain], .. } = self.options;
-        TextureUse {
+        Some(TextureUse {
             channels,
             encoding,
             // v counts from the lower edge of the image.
@@ -143,7 +133,7 @@ impl Map {
             scale: [gain; 3],
             bias: [base; 3],
             ..TextureUse::from_lower_left(texture)
-        }
+        })
     }
 }
 

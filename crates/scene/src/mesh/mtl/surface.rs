@@ -8,7 +8,7 @@ use crate::{
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
     mesh::{
         DEFAULT_IOR, IOR_RANGE, MeshMaterial,
-        images::{Images, has_alpha, holds_normals},
+        images::{Images, has_alpha, holds_normals, opacity_of},
     },
     texture::{Channels, Encoding},
 };
@@ -32,11 +32,11 @@ impl LibraryMaterial {
         let color_map = self.color_map.as_ref();
         let color =
             color_map.and_then(|map| map.load(Channels::Color, Encoding::Srgb, images, warnings));
-        let mut load = |map: &Option<Map>, channels, encoding| {
+        let mut load = |map: &Option<Map>, encoding| {
             let map = map.as_ref()?;
-            map.load(map.options.channels.unwrap_or(channels), encoding, images, warnings)
+            map.load(map.options.channels.unwrap_or_default(), encoding, images, warnings)
         };
-        let mut opacity_texture = load(&self.opacity_map, Channels::Color, Encoding::Linear);
+        let mut opacity_texture = load(&self.opacity_map, Encoding::Linear);
         if let (Some(opacity), None) =
             (&mut opacity_texture, self.opacity_map.as_ref().and_then(|map| map.options.channels))
             && has_alpha(&opacity.texture)
@@ -44,18 +44,14 @@ impl LibraryMaterial {
             opacity.channels = Channels::Alpha;
         }
         // The transparent texels of a colour image cut the surface out.
-        if self.opacity_map.is_none()
-            && let (Some(map), Some(color)) = (color_map, &color)
-            && has_alpha(&color.texture)
-        {
-            let texture = color.texture.clone();
-            opacity_texture = Some(map.reading(texture, Channels::Alpha, Encoding::Linear));
+        if self.opacity_map.is_none() {
+            opacity_texture = color.as_ref().and_then(opacity_of);
         }
-        let emission_texture = load(&self.emission_map, Channels::Color, Encoding::Srgb);
+        let emission_texture = load(&self.emission_map, Encoding::Srgb);
         let mut surface = Surface {
-            roughness: load(&self.roughness_map, Channels::Color, Encoding::Linear),
-            metallic: load(&self.metallic_map, Channels::Color, Encoding::Linear),
-            normal: load(&self.normal_map, Channels::Color, Encoding::Linear),
+            roughness: load(&self.roughness_map, Encoding::Linear),
+            metallic: load(&self.metallic_map, Encoding::Linear),
+            normal: load(&self.normal_map, Encoding::Linear),
             normal_scale: self.normal_map.as_ref().map_or(1.0, |map| map.options.strength),
             ..Surface::default()
         };
@@ -69,7 +65,7 @@ impl LibraryMaterial {
         let mut ignored = self.ignored.clone();
         // Blender and others write normal maps under this key.
         if let Some(map) = &self.bump_map
-            && let Some(bumps) = load(&self.bump_map, Channels::Color, Encoding::Linear)
+            && let Some(bumps) = load(&self.bump_map, Encoding::Linear)
         {
             if surface.normal.is_none() && holds_normals(&bumps.texture) {
                 surface.normal = Some(bumps);
