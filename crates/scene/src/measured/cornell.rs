@@ -23,9 +23,8 @@ use crate::{
     error::{Error, Result},
     files,
     measured::{
-        layout::*,
         lookup,
-        table::{CELL_COUNT, MeasuredTable, bin_directions},
+        table::{CELL_COUNT, MeasuredTable, PHI_DIFFERENCE, THETA_DIFFERENCE, bin_directions},
     },
     spectrum,
 };
@@ -102,8 +101,6 @@ pub fn read(path: &Path) -> Result<(SampleSet, usize)> {
 /// Interpolates the samples at the bin centres of the grid. The coordinates of the interpolation
 /// agree at φ_d and π − φ_d, so half of the grid suffices.
 fn bake(samples: &SampleSet) -> Vec<Vec3> {
-    const THETA_DIFFERENCE: usize = MEASURED_THETA_DIFFERENCE_BINS as usize;
-    const PHI_DIFFERENCE: usize = MEASURED_PHI_DIFFERENCE_BINS as usize;
     let mut cells = vec![Vec3::NAN; CELL_COUNT];
     cells.par_chunks_mut(PHI_DIFFERENCE).enumerate().for_each(|(row, cells)| {
         for phi in 0..PHI_DIFFERENCE / 2 {

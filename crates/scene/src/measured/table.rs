@@ -23,9 +23,9 @@ use crate::measured::{
 /// Bins of θ_h as an index.
 const THETA_HALF: usize = MEASURED_THETA_HALF_BINS as usize;
 /// Bins of θ_d as an index.
-const THETA_DIFFERENCE: usize = MEASURED_THETA_DIFFERENCE_BINS as usize;
+pub(super) const THETA_DIFFERENCE: usize = MEASURED_THETA_DIFFERENCE_BINS as usize;
 /// Bins of φ_d as an index.
-const PHI_DIFFERENCE: usize = MEASURED_PHI_DIFFERENCE_BINS as usize;
+pub(super) const PHI_DIFFERENCE: usize = MEASURED_PHI_DIFFERENCE_BINS as usize;
 /// Cells of the grid.
 pub const CELL_COUNT: usize = THETA_HALF * THETA_DIFFERENCE * PHI_DIFFERENCE;
 
