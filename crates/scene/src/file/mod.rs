@@ -17,7 +17,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 pub(crate) use lamp::{LampEntry, LampKeys, LampKindEntry};
-pub(crate) use material::{ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry};
+pub(crate) use material::{MaterialEntry, MaterialKeys, MaterialKindEntry};
 pub(crate) use portal::PortalKeys;
 pub(crate) use value::{NumberOrVector, TextureEntry, Textured};
 

@@ -11,9 +11,7 @@ use super::{FINITE, Loader, MIN_ALPHA};
 use crate::{
     Scene,
     error::Result,
-    file::{
-        ConductorEntry, MaterialEntry, MaterialKeys, MaterialKindEntry, TextureEntry, Textured,
-    },
+    file::{MaterialEntry, MaterialKeys, MaterialKindEntry, TextureEntry, Textured},
     material::{ConductorFresnel, Emission, Material, MaterialKind, Opacity, Principled, Surface},
     measured::MeasuredFiles,
     texture::{Encoding, Texture, TextureCache, TextureUse},
@@ -133,12 +131,18 @@ impl Loader<'_> {
                 }
             }
             MaterialKindEntry::Conductor(entry) => {
-                let fresnel = match &entry.reflectance {
-                    Some(value) if entry.eta.is_none() && entry.k.is_none() => {
-                        let reflectance = share("reflectance", value, surface)?;
-                        ConductorFresnel::Schlick { reflectance }
+                let fresnel = match (&entry.reflectance, entry.eta, entry.k) {
+                    (Some(value), None, None) => ConductorFresnel::Schlick {
+                        reflectance: share("reflectance", value, surface)?,
+                    },
+                    (None, Some(eta), Some(k)) => ConductorFresnel::Exact {
+                        eta: self.vector(&format!("{label}: eta"), eta, (0.01, 100.0))?,
+                        k: self.vector(&format!("{label}: k"), k, (0.0, 100.0))?,
+                    },
+                    _ => {
+                        let expected = "a conductor needs either reflectance, or eta and k";
+                        return Err(self.error(format!("{label}: {expected}")));
                     }
-                    _ => self.exact_fresnel(label, entry)?,
                 };
                 let alpha = if let Some(value @ Textured::Texture(_)) = &entry.roughness {
                     self.check(entry.alpha.is_none(), || {
@@ -294,20 +298,6 @@ impl Loader<'_> {
                 Err(self.error(format!(
                     "{label}: expected exactly one of alpha and roughness, found {found}"
                 )))
-            }
-        }
-    }
-
-    fn exact_fresnel(&self, label: &str, entry: &ConductorEntry) -> Result<ConductorFresnel> {
-        match (&entry.reflectance, entry.eta, entry.k) {
-            (None, Some(eta), Some(k)) => {
-                let eta = self.vector(&format!("{label}: eta"), eta, (0.01, 100.0))?;
-                let k = self.vector(&format!("{label}: k"), k, (0.0, 100.0))?;
-                Ok(ConductorFresnel::Exact { eta, k })
-            }
-            _ => {
-                Err(self
-                    .error(format!("{label}: a conductor needs either reflectance, or eta and k")))
             }
         }
     }
