@@ -194,20 +194,15 @@ impl GltfReader<'_> {
                     for primitive in mesh.primitives() {
                         let key = [mesh.index(), primitive.index()];
                         // The weights of a node make its mesh another one.
-                        let repeated = match node.weights() {
-                            None => self.repeated_primitive(key, &primitive, weights)?,
-                            Some(_) => None,
-                        };
-                        match repeated {
-                            Some(at) => {
-                                let repeated = &mut self.mesh.repeated[at];
-                                repeated.name = mesh.name().unwrap_or(&name).to_owned();
-                                repeated.places.push(world_from_instance);
-                            }
-                            None => {
-                                let place = Place::Node(world_from_instance);
-                                self.read_primitive(&primitive, weights, place)?;
-                            }
+                        if node.weights().is_none()
+                            && let Some(at) = self.repeated_primitive(key, &primitive, weights)?
+                        {
+                            let repeated = &mut self.mesh.repeated[at];
+                            repeated.name = mesh.name().unwrap_or(&name).to_owned();
+                            repeated.places.push(world_from_instance);
+                        } else {
+                            let place = Place::Node(world_from_instance);
+                            self.read_primitive(&primitive, weights, place)?;
                         }
                     }
                 }

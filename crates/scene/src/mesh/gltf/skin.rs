@@ -24,25 +24,22 @@ impl GltfReader<'_> {
     pub(super) fn read_skinned(&mut self, node: &Node, worlds: &[Option<Mat4>]) -> Result<()> {
         let (Some(mesh), Some(skin)) = (node.mesh(), node.skin()) else { return Ok(()) };
         let place = || label("skin", skin.index(), skin.name());
-        let binds = match skin.inverse_bind_matrices() {
-            Some(accessor) => {
-                let kind = (accessor.data_type(), accessor.dimensions());
-                if kind != (DataType::F32, Dimensions::Mat4) {
-                    let (data_type, dimensions) = kind;
-                    return Err(self.error(format!(
-                        "accessor {}: expected matrices of 4×4 floats, found {dimensions:?} of \
-                         {data_type:?}",
-                        accessor.index()
-                    )));
-                }
-                Some(self.elements(&accessor, |bytes| {
-                    let numbers = bytes[..MATRIX_BYTES].as_chunks::<4>().0;
-                    let number = |index: usize| f32::from_le_bytes(numbers[index]);
-                    Mat4::from_cols_array(&std::array::from_fn(number))
-                })?)
+        let binds = skin.inverse_bind_matrices().map(|accessor| {
+            let (data_type, dimensions) = (accessor.data_type(), accessor.dimensions());
+            if (data_type, dimensions) != (DataType::F32, Dimensions::Mat4) {
+                return Err(self.error(format!(
+                    "accessor {}: expected matrices of 4×4 floats, found {dimensions:?} of \
+                     {data_type:?}",
+                    accessor.index()
+                )));
             }
-            None => None,
-        };
+            self.elements(&accessor, |bytes| {
+                let numbers = bytes[..MATRIX_BYTES].as_chunks::<4>().0;
+                let number = |index: usize| f32::from_le_bytes(numbers[index]);
+                Mat4::from_cols_array(&std::array::from_fn(number))
+            })
+        });
+        let binds = binds.transpose()?;
         let mut joints = Vec::new();
         for (index, joint) in skin.joints().enumerate() {
             let world = worlds[joint.index()].ok_or_else(|| {
