@@ -24,10 +24,8 @@ const FLOAT: u8 = 10;
 struct Field {
     kind: u8,
     shape: Vec<usize>,
-    /// First byte of the values.
-    first: usize,
-    /// Count of the values.
-    count: usize,
+    /// Place of the values in the file.
+    bytes: Range<usize>,
 }
 
 /// Fields of a file by name, and its bytes.
@@ -66,10 +64,7 @@ impl<'a> TensorFile<'a> {
             )));
         };
         match <[usize; DIMENSIONS]>::try_from(&field.shape[..]) {
-            Ok(shape) if field.kind == kind => {
-                let values = field.first..field.first + field.count * size_of_kind(kind);
-                Ok((&self.bytes[values], shape))
-            }
+            Ok(shape) if field.kind == kind => Ok((&self.bytes[field.bytes.clone()], shape)),
             _ => Err(self.error(format!(
                 "field `{name}`: expected {kind_name} in {DIMENSIONS} dimensions, found type {} and \
                  shape {:?}",
@@ -111,11 +106,6 @@ impl<'a> TensorFile<'a> {
     }
 }
 
-/// Bytes of a value of the types that are read.
-fn size_of_kind(kind: u8) -> usize {
-    if kind == FLOAT { size_of::<f32>() } else { 1 }
-}
-
 /// Fields of a whole file.
 fn fields(bytes: &[u8]) -> std::result::Result<BTreeMap<String, Field>, String> {
     if !bytes.starts_with(&MAGIC) {
@@ -154,10 +144,11 @@ fn fields(bytes: &[u8]) -> std::result::Result<BTreeMap<String, Field>, String> 
         let count = shape.iter().try_fold(1_u64, |count, &length| count.checked_mul(length));
         let count = count.and_then(|count| usize::try_from(count).ok());
         // A type that is not read has at least a byte a value.
+        let size = if kind == FLOAT { size_of::<f32>() } else { 1 };
         let end = count
-            .and_then(|count| count.checked_mul(size_of_kind(kind)))
+            .and_then(|count| count.checked_mul(size))
             .and_then(|length| first?.checked_add(length));
-        let (Some(first), Some(count), Some(end)) = (first, count, end) else {
+        let (Some(first), Some(end)) = (first, end) else {
             return Err(format!("field `{name}`: the shape {shape:?} is larger than any file"));
         };
         if first < HEADER_BYTES || end > bytes.len() {
@@ -168,7 +159,7 @@ fn fields(bytes: &[u8]) -> std::result::Result<BTreeMap<String, Field>, String> 
             ));
         }
         let shape = shape.into_iter().map(|length| length as usize).collect();
-        fields.insert(name, Field { kind, shape, first, count });
+        fields.insert(name, Field { kind, shape, bytes: first..end });
     }
     Ok(fields)
 }
