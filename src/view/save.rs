@@ -6,10 +6,10 @@ use std::{
 };
 
 use crate::{
-    error::{Error, Result},
+    error::Result,
     files::write_text,
     film::{Image, png::write_rgb8},
-    scene::Camera,
+    scene::{Camera, Scene},
 };
 
 /// Number of written views that the window offers.
@@ -49,53 +49,12 @@ pub(super) fn views(scene: &str) -> Vec<PathBuf> {
     (1..=MOST_VIEWS).map(of).filter(|file| file.exists()).collect()
 }
 
-/// Table `[camera]` of a file that [`camera_toml`] has written.
-#[derive(serde::Deserialize)]
-struct View {
-    camera: ViewCamera,
-}
-
-/// Camera of a view, as in a scene file.
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ViewCamera {
-    position: [f32; 3],
-    look_at: [f32; 3],
-    up: [f32; 3],
-    vertical_fov_deg: f32,
-    #[serde(default)]
-    aperture_radius: f32,
-    focus_distance: Option<f32>,
-}
-
-/// Reads a camera that [`camera_toml`] has written.
+/// Reads a camera that [`camera_toml`] has written: of a scene without anything else.
 ///
 /// # Errors
 /// A file that cannot be read, or holds no camera.
 pub(super) fn read_camera(path: &Path) -> Result<Camera> {
-    let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, "read", error))?;
-    let View { camera } =
-        toml::from_str(&text).map_err(|error| Error::format(path, error.to_string()))?;
-    let [position, look_at] = [camera.position, camera.look_at].map(glam::Vec3::from);
-    let camera = Camera {
-        position,
-        look_at,
-        up: camera.up.into(),
-        vertical_fov_deg: camera.vertical_fov_deg,
-        aperture_radius: camera.aperture_radius,
-        focus_distance: camera.focus_distance.unwrap_or(position.distance(look_at)),
-    };
-    let across = camera.up.cross(camera.look_at - camera.position).length();
-    let is_usable = across > 0.0
-        && across.is_finite()
-        && (0.01..179.0).contains(&camera.vertical_fov_deg)
-        && (0.0..f32::MAX).contains(&camera.aperture_radius)
-        && (f32::MIN_POSITIVE..f32::MAX).contains(&camera.focus_distance);
-    if is_usable {
-        Ok(camera)
-    } else {
-        Err(Error::format(path, format!("expected a camera that sees something, found {camera:?}")))
-    }
+    Scene::load(path).map(|scene| scene.camera)
 }
 
 /// Writes size and pixels of the window, the film to the left with its metadata, and the camera.
