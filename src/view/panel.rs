@@ -17,7 +17,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     film::{Tone, tone::auto_exposure},
-    gpu::{Device, Presented, Swapchain, swapchain::Target},
+    gpu::{Buffer, Device, Presented, Swapchain, swapchain::Target},
     shader::constants::SHOW_PICTURE,
 };
 
@@ -156,10 +156,8 @@ impl Panel {
             if size.contains(&0) {
                 return Ok(());
             }
-            let is_bgra = self.swapchain.is_bgra();
-            let pixels =
-                compose(&mut self.projector, size, self.has_right, self.tone, self.layer, is_bgra)?;
-            match self.swapchain.present(pixels)? {
+            let pixels = self.compose(size, self.swapchain.is_bgra())?;
+            match self.swapchain.present(&pixels)? {
                 Presented::Shown | Presented::Skipped => return Ok(()),
                 Presented::Outdated => self.swapchain.resize(self.size)?,
                 Presented::Lost => {
@@ -183,23 +181,15 @@ impl Panel {
         }
         let overlay = self.projector.set_overlay(Overlay::default())?;
         size[0] = size[0].saturating_sub(overlay.reserved).max(1);
-        let pixels =
-            compose(&mut self.projector, size, self.has_right, self.tone, self.layer, false)?;
+        let pixels = self.compose(size, false)?;
         let pixels: Vec<[u8; 4]> = pixels.download(size[0] as usize * size[1] as usize)?;
         self.projector.set_overlay(overlay)?;
         Ok((size, pixels.into_iter().map(|[red, green, blue, _]| [red, green, blue]).collect()))
     }
-}
 
-fn compose(
-    projector: &mut Projector,
-    size: [u32; 2],
-    has_right: bool,
-    tone: Tone,
-    layer: u32,
-    is_bgra: bool,
-) -> Result<&crate::gpu::Buffer> {
-    // Exposure and curve are for the picture; colours of other layers are shown as they are.
-    let tone = if layer == SHOW_PICTURE { tone } else { Tone::default() };
-    projector.compose(size, has_right, (tone.exposure.exp2(), tone.curve as u32), is_bgra)
+    fn compose(&mut self, size: [u32; 2], is_bgra: bool) -> Result<Buffer> {
+        // Exposure and curve are for the picture; colours of other layers are shown as they are.
+        let tone = if self.layer == SHOW_PICTURE { self.tone } else { Tone::default() };
+        self.projector.compose(size, self.has_right, tone, is_bgra)
+    }
 }

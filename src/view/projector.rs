@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     error::Result,
+    film::Tone,
     gpu::{Buffer, Commands, DescriptorSet, Device, MOST_INVOCATIONS, Pipeline},
     session::Renderer,
     shader::{
@@ -92,7 +93,7 @@ impl Projector {
         layer: u32,
         mean_radiance: f32,
     ) -> Result<()> {
-        let index = usize::from(place == Place::Right);
+        let index = place as usize;
         let mut commands = Commands::begin(&self.device)?;
         for (film, first_pixel, pixels) in renderer.film_pages() {
             for first_place in (0..pixels).step_by(MOST_INVOCATIONS as usize) {
@@ -149,15 +150,15 @@ impl Projector {
         [left + reserved, top, shown_width, shown_height]
     }
 
-    /// Draws the pixels of a window of `size` pixels: films with this exposure factor and `CURVE_…`,
-    /// whole and at the largest size that fits. Fails if the device does.
+    /// Draws the pixels of a window of `size` pixels: films in this tone, whole and at the largest size that
+    /// fits. Fails if the device does.
     pub(crate) fn compose(
         &mut self,
         [width, height]: [u32; 2],
         has_right: bool,
-        (exposure, curve): (f32, u32),
+        tone: Tone,
         is_bgra: bool,
-    ) -> Result<&Buffer> {
+    ) -> Result<Buffer> {
         let window = match self.window.take() {
             Some(window) if self.window_size == [width, height] => window,
             _ => self.make_window([width, height])?,
@@ -180,8 +181,8 @@ impl Projector {
             is_reduced: u32::from(self.sizes[0] != self.film),
             split: if has_right { left + shown_width / 2 } else { width },
             first_index: 0,
-            exposure,
-            curve,
+            exposure: tone.exposure.exp2(),
+            curve: tone.curve as u32,
             is_bgra: u32::from(is_bgra),
             inset_width: if has_inset { inset[0] } else { 0 },
             inset_height: if has_inset { inset[1] } else { 0 },
@@ -197,7 +198,7 @@ impl Projector {
             commands.dispatch(&self.compose, &[set], bytemuck::bytes_of(&frame), invocations);
         }
         commands.submit_and_wait()?;
-        Ok(buffer)
+        Ok(buffer.clone())
     }
 
     fn make_window(
@@ -224,12 +225,12 @@ impl Projector {
 
     /// Replaces the linear pixels of a film as it was shown last. Fails if the device does.
     pub(crate) fn replace(&self, place: Place, pixels: &[[f32; 3]]) -> Result<()> {
-        self.shown[usize::from(place == Place::Right)].0.upload(bytemuck::cast_slice(pixels))
+        self.shown[place as usize].0.upload(bytemuck::cast_slice(pixels))
     }
 
     /// Returns the linear pixels of a film as they were shown last. Fails if the device does.
     pub(crate) fn shown(&self, place: Place) -> Result<Vec<[f32; 3]>> {
-        let index = usize::from(place == Place::Right);
+        let index = place as usize;
         let [width, height] = self.sizes[index];
         self.shown[index].0.download(width as usize * height as usize)
     }

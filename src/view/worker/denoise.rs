@@ -60,7 +60,7 @@ impl Denoising {
         has_ended: bool,
     ) -> Result<Option<Filtered>> {
         let Some(denoiser) = &self.denoiser else { return Ok(None) };
-        let filtered = &mut self.filtered[usize::from(place == Place::Right)];
+        let filtered = &mut self.filtered[place as usize];
         let pause = REST_INTERVAL.max(REST_SHARE * self.took);
         if !has_ended && filtered.is_some_and(|at| at.elapsed() < pause) {
             return Ok(Some(Filtered::Before));
