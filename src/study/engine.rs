@@ -6,9 +6,8 @@ use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 use super::{
     contender::Contender,
     folder::Folder,
-    job::{RunJob, exposure},
     plan::{CheckPlan, Plan, ReferencePlan},
-    reference::{HALF_STEMS, Reference},
+    reference::{HALF_STEMS, Reference, exposure},
     reference_check::{self, CheckJob, ReferenceCheck, Verdict},
     rule::Rule,
     runs::{Round, Run, StudiedScene},
@@ -220,10 +219,9 @@ impl Study<'_> {
         &mut self,
         scene: &Scene,
         buffers: &mut SharedBuffers<'_>,
-        (reference, surfaces): (&Reference, &Surfaces),
+        compared: (&Reference, &Surfaces),
         results: &mut Results,
     ) -> Result<()> {
-        let exposure = exposure(&reference.mean());
         let mut sessions: BTreeMap<String, Session> = BTreeMap::new();
         for task in self.plan.tasks() {
             let (rule, seed, contender) = task;
@@ -238,19 +236,7 @@ impl Study<'_> {
                 sessions.insert(contender.label.clone(), session);
             }
             let Some(session) = sessions.get_mut(&contender.label) else { continue };
-            let job = RunJob {
-                scene,
-                reference,
-                surfaces,
-                exposure,
-                contender,
-                rule,
-                seed,
-                levels: &self.plan.spp,
-                conditions: self.conditions(scene, Some(contender))?,
-                folder: self.folder,
-            };
-            let run = job.execute(session, &mut self.watch)?;
+            let run = self.render_run(scene, compared, task, session)?;
             write_json(&self.run_path(scene, task), &run)?;
             if let Some(last) = run.last() {
                 self.watch.note(&format!(

@@ -12,7 +12,7 @@ pub(crate) mod falsecolour;
 pub mod file;
 mod finished;
 pub mod folder;
-pub(crate) mod job;
+mod job;
 pub mod metrics;
 pub mod overhead;
 pub(crate) mod own_errors;

@@ -17,7 +17,7 @@ use super::{
     metrics::{Metrics, not_finite},
     own_errors::OwnErrors,
     plan::ReferencePlan,
-    statistics::mean_standard_error,
+    statistics::{mean_standard_error, percentile},
     watch::Watch,
 };
 use crate::{
@@ -109,6 +109,13 @@ pub fn mean(first: &RgbImage, second: &RgbImage) -> RgbImage {
     };
     let pixels = first.pixels.iter().zip(&second.pixels).map(mean).collect();
     RgbImage { width: first.width, height: first.height, pixels }
+}
+
+/// Exposure in stops at which 85% of the pixels stay below white, by their brightest channel.
+pub(crate) fn exposure(picture: &RgbImage) -> f32 {
+    let brightest = |pixel: &[f32; 3]| f64::from(pixel[0].max(pixel[1]).max(pixel[2]));
+    let white = percentile(picture.pixels.iter().map(brightest).collect(), 85);
+    white.filter(|white| *white > 0.0).map_or(0.0, |white| -(white as f32).log2())
 }
 
 impl Reference {
@@ -335,5 +342,19 @@ fn check(image: &Image, path: &Path, scene: &Scene) -> Result<()> {
             "the reference {} has {count} pixels that are not finite, {first}",
             path.display()
         )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn most_pixels_are_below_white() {
+        let pixels: Vec<[f32; 3]> = (1..=100u8).map(|value| [f32::from(value), 0.0, 1.0]).collect();
+        let picture = RgbImage { width: 10, height: 10, pixels };
+        assert!((exposure(&picture) + 85.0_f32.log2()).abs() < 1e-6);
+        let black = RgbImage { width: 1, height: 1, pixels: vec![[0.0; 3]] };
+        assert_eq!(exposure(&black), 0.0);
     }
 }

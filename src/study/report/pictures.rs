@@ -11,9 +11,8 @@ use crate::{
     study::{
         falsecolour::{self, Scale},
         folder::Folder,
-        job::exposure,
         metrics::squared_errors,
-        reference::{HALF_STEMS, mean},
+        reference::{HALF_STEMS, exposure, mean},
         rule::Rule,
         runs::{Run, StudiedScene},
         surfaces::{self, mask},
