@@ -181,8 +181,8 @@ impl<'a> Bench<'a> {
 
     /// Runs one pass; seconds of the device, and of the host where it traces.
     fn run(&self, pass: &Pass) -> Result<f64> {
-        let answers = self.waves.answers(self.scene.parameters());
-        let host = self.scene.geometry().host_tracer().map(|tracer| (tracer, answers));
+        let tracer = self.scene.geometry().host_tracer();
+        let host = tracer.map(|tracer| (tracer, &self.waves.answers, self.scene.parameters()));
         let mut recording = Recording::begin(self.device, 1, host, false)?;
         recording.add(pass, &self.sets(), &self.wave)?;
         Ok(recording.finish()?.values().sum::<f64>() * 1e-3)
@@ -194,7 +194,7 @@ impl<'a> Bench<'a> {
 
     /// Downloads the rays that `trace` would follow.
     fn active_rays(&self) -> Result<Vec<Option<CpuRay>>> {
-        let rays: Vec<Ray> = self.waves.rays().download(self.wave.pixel_count as usize)?;
+        let rays: Vec<Ray> = self.waves.answers.rays.download(self.wave.pixel_count as usize)?;
         let cpu_ray = |ray: &Ray| CpuRay::new_inf(ray.origin.into(), ray.direction.into());
         Ok(rays.iter().map(|ray| (ray.is_active != 0).then(|| cpu_ray(ray))).collect())
     }
@@ -202,9 +202,9 @@ impl<'a> Bench<'a> {
     /// Downloads the rays that `shadow` would follow.
     fn active_shadow_rays(&self, accel: &Accel) -> Result<Vec<Option<CpuRay>>> {
         let paths = self.wave.pixel_count as usize;
-        let hits: Vec<Hit> = self.waves.hits().download(paths)?;
+        let hits: Vec<Hit> = self.waves.answers.hits.download(paths)?;
         let count = paths * self.wave.shadow_ray_count as usize;
-        let shadow_rays: Vec<ShadowRay> = self.waves.shadow_rays().download(count)?;
+        let shadow_rays: Vec<ShadowRay> = self.waves.answers.shadow_rays.download(count)?;
         Ok(shadow_rays
             .iter()
             .zip(hits.iter().cycle())
@@ -224,10 +224,10 @@ impl<'a> Bench<'a> {
     /// Tests for each of `count` rays whether it met a surface, after `trace` or, for any hit, `shadow`.
     fn met(&self, any_hit: bool, count: usize) -> Result<Vec<bool>> {
         if any_hit {
-            let visibility: Vec<u32> = self.waves.visibility().download(count)?;
+            let visibility: Vec<u32> = self.waves.answers.visibility.download(count)?;
             return Ok(visibility.iter().map(|visible| *visible == 0).collect());
         }
-        let hits: Vec<Hit> = self.waves.hits().download(count)?;
+        let hits: Vec<Hit> = self.waves.answers.hits.download(count)?;
         Ok(hits.iter().map(|hit| hit.material != NO_MATERIAL).collect())
     }
 }

@@ -379,7 +379,7 @@ fn rays_follow_the_density_that_they_are_divided_by() {
         }
         support::assert_silent();
         let rays: Vec<ShadowRay> =
-            waves.shadow_rays().download((4 * PATHS * SHADOW_RAYS) as usize).unwrap();
+            waves.answers.shadow_rays.download((4 * PATHS * SHADOW_RAYS) as usize).unwrap();
 
         let tables = EnvironmentTables::new(&cache.scene.environment);
         let brdfs = MaterialTables::new(&cache.scene.materials).unwrap();

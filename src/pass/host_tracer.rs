@@ -48,33 +48,31 @@ pub struct HostTracer {
     has_instances: bool,
 }
 
-/// Buffers that the host reads and answers in: those of a wave, and the scene's parameters.
-pub struct Answers<'a> {
+/// Buffers of a wave that the host reads and answers in.
+pub struct Answers {
     /// [`Ray`] of every path.
-    pub rays: &'a Buffer,
+    pub rays: Buffer,
     /// [`Hit`] of every path.
-    pub hits: &'a Buffer,
+    pub hits: Buffer,
     /// Instance of every hit.
-    pub instances: &'a Buffer,
-    /// [`ShadowRay`]s of the group.
-    pub shadow_rays: &'a Buffer,
-    /// A word for each of them.
-    pub visibility: &'a Buffer,
+    pub instances: Buffer,
+    /// [`ShadowRay`]s of the last group: direction `k` of path `i` at `k · path_count + i`.
+    pub shadow_rays: Buffer,
+    /// One word per shadow ray, in their order: 1 if it reaches the light, else 0.
+    pub visibility: Buffer,
     /// [`PathState`] of every path.
-    pub paths: &'a Buffer,
+    pub paths: Buffer,
     /// Lists of living paths.
-    pub path_lists: &'a Buffer,
-    /// [`crate::shader::structs::SceneParameters`].
-    pub parameters: &'a Buffer,
+    pub path_lists: Buffer,
 }
 
-impl Answers<'_> {
+impl Answers {
     /// True if any path that a pass walks has a ray to follow.
     ///
     /// # Errors
     /// As [`HostTracer::answer`].
     pub(super) fn has_rays(&self, wave: &Wave) -> Result<bool> {
-        let ListedPaths { count, list } = ListedPaths::new(wave, self.path_lists)?;
+        let ListedPaths { count, list } = ListedPaths::new(wave, &self.path_lists)?;
         let rays = self.rays.words()?;
         let is_active = |path: usize| {
             let word = words_of::<Ray>() * path + offset_of!(Ray, is_active) / size_of::<u32>();
@@ -116,6 +114,7 @@ impl HostTracer {
     }
 
     /// Answers what a pass asks about the rays of a wave. Returns the number of paths that it walked.
+    /// `parameters` holds [`crate::shader::structs::SceneParameters`].
     ///
     /// # Errors
     /// The host does not share the memory of a buffer.
@@ -123,16 +122,17 @@ impl HostTracer {
         &self,
         question: Question,
         wave: &Wave,
-        answers: &Answers<'_>,
+        answers: &Answers,
+        parameters: &Buffer,
     ) -> Result<u32> {
-        let paths = ListedPaths::new(wave, answers.path_lists)?;
+        let paths = ListedPaths::new(wave, &answers.path_lists)?;
         let passages = self.passages.as_ref().map(Passages::open).transpose()?;
         let rays = Rays { tree: &self.tree, passages: passages.as_ref() };
         match question {
             Question::Closest => {
                 let closest = Closest {
                     rays,
-                    chances: Chances::new(wave, answers.parameters.words()?, self.has_instances),
+                    chances: Chances::new(wave, parameters.words()?, self.has_instances),
                     is_coherent: wave.vertex == 0,
                     from: answers.rays.words()?,
                     hits: answers.hits.words()?,

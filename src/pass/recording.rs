@@ -8,12 +8,12 @@ use super::{
 };
 use crate::{
     error::Result,
-    gpu::{Commands, DescriptorSet, Device, PassTimes},
+    gpu::{Buffer, Commands, DescriptorSet, Device, PassTimes},
     shader::structs::Wave,
 };
 
-/// The host's tracer and the buffers of the wave whose rays it follows.
-pub type Host<'a> = (&'a HostTracer, Answers<'a>);
+/// The host's tracer, the buffers of the wave whose rays it follows, and the parameters of the scene.
+pub type Host<'a> = (&'a HostTracer, &'a Answers, &'a Buffer);
 
 /// Passes over a wave, in their order.
 pub struct Recording<'a> {
@@ -51,7 +51,8 @@ impl<'a> Recording<'a> {
     /// # Errors
     /// As [`Commands::submit_and_wait`].
     pub fn add(&mut self, pass: &Pass, sets: &[&DescriptorSet], wave: &Wave) -> Result<bool> {
-        if let (Some(question), Some((tracer, answers))) = (pass.kernel().question, &self.host) {
+        if let (Some(question), Some(host)) = (pass.kernel().question, self.host) {
+            let (tracer, answers, parameters) = host;
             let next = Commands::begin_timed(self.device, self.most_passes)?;
             let mut before = std::mem::replace(&mut self.commands, next);
             before.make_visible_to_host();
@@ -62,7 +63,7 @@ impl<'a> Recording<'a> {
             if may_end && !answers.has_rays(wave)? {
                 return Ok(false);
             }
-            let walked = tracer.answer(question, wave, answers)?;
+            let walked = tracer.answer(question, wave, answers, parameters)?;
             if question == Question::Closest {
                 self.most_listed = Some(walked);
             }

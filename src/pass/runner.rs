@@ -271,8 +271,7 @@ impl Runner {
         let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
         let order = wave_order(&settings, technique.steps(), wave, vertices);
         let tracer = self.scene.geometry().host_tracer();
-        let answers = || self.waves.answers(self.scene.parameters());
-        let host = tracer.map(|tracer| (tracer, answers()));
+        let host = tracer.map(|tracer| (tracer, &self.waves.answers, self.scene.parameters()));
         let pages = if accumulates { self.accumulated().count() } else { 0 };
         let accumulation = self.accumulation();
         made(&mut self.passes, &self.device, accumulation)?;

@@ -34,13 +34,8 @@ pub(crate) fn path_list_bytes(paths: u64) -> u64 {
 pub struct WaveBuffers {
     set: DescriptorSet,
     capacity: u32,
-    rays: Buffer,
-    hits: Buffer,
-    shadow_rays: Buffer,
-    visibility: Buffer,
-    paths: Buffer,
-    instances: Buffer,
-    path_lists: Buffer,
+    /// Buffers that passes answer in, or the host where it traces.
+    pub answers: Answers,
 }
 
 impl WaveBuffers {
@@ -75,56 +70,46 @@ impl WaveBuffers {
 
         let paths = u64::from(capacity);
         let shadow_ray_count = paths * u64::from(shadow_rays);
-        let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
-        let rays = make("rays", paths, size_of::<Ray>())?;
-        let hits = make("hits", paths, size_of::<Hit>())?;
-        let shadow_rays = make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?;
-        let visibility = make("visibility", shadow_ray_count, size_of::<u32>())?;
-        let surface_count = if of.is_textured() { paths } else { 1 };
-        let surfaces = make("hit surfaces", surface_count, size_of::<Surface>())?;
-        let instance_count = if of.is_instanced() { paths } else { 1 };
-        let instances = make("hit instances", instance_count, size_of::<u32>())?;
-        let lamp_list_count = if of.has_lamp_cells() { paths } else { 1 };
-        let lamp_lists = make("lamp lists", lamp_list_count, size_of::<u32>())?;
-        let feature_count = if demand.has_features { paths } else { 1 };
-        let features = make("features", feature_count, size_of::<Feature>())?;
         let groups = u64::from(demand.light_groups);
-        let group_radiance =
-            make("group radiance", (groups * paths).max(1), size_of::<[f32; 3]>())?;
-        let lamp_group_count = if groups > 0 { paths } else { 1 };
-        let lamp_groups = make("lamp groups", lamp_group_count, size_of::<u32>())?;
-        let path_lists = Buffer::new(device, "path lists", path_list_bytes(paths))?;
-        let paths = make("paths", paths, size_of::<PathState>())?;
+        let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
+        let make_if = |is_needed, name, size| make(name, if is_needed { paths } else { 1 }, size);
+        let answers = Answers {
+            rays: make("rays", paths, size_of::<Ray>())?,
+            hits: make("hits", paths, size_of::<Hit>())?,
+            instances: make_if(of.is_instanced(), "hit instances", size_of::<u32>())?,
+            shadow_rays: make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?,
+            visibility: make("visibility", shadow_ray_count, size_of::<u32>())?,
+            paths: make("paths", paths, size_of::<PathState>())?,
+            path_lists: Buffer::new(device, "path lists", path_list_bytes(paths))?,
+        };
+        let surfaces = make_if(of.is_textured(), "hit surfaces", size_of::<Surface>())?;
+        let lamp_lists = make_if(of.has_lamp_cells(), "lamp lists", size_of::<u32>())?;
+        let features = make_if(demand.has_features, "features", size_of::<Feature>())?;
+        let radiance_count = (groups * paths).max(1);
+        let group_radiance = make("group radiance", radiance_count, size_of::<[f32; 3]>())?;
+        let lamp_groups = make_if(groups > 0, "lamp groups", size_of::<u32>())?;
+        let Answers { rays, hits, instances, shadow_rays, visibility, paths, path_lists } =
+            &answers;
         let bound = [
-            (wave::RAYS, &rays),
-            (wave::RAY_TEXELS, &rays),
-            (wave::HITS, &hits),
-            (wave::HIT_TEXELS, &hits),
-            (wave::SHADOW_RAYS, &shadow_rays),
-            (wave::SHADOW_RAY_TEXELS, &shadow_rays),
-            (wave::VISIBILITY, &visibility),
-            (wave::PATHS, &paths),
+            (wave::RAYS, rays),
+            (wave::RAY_TEXELS, rays),
+            (wave::HITS, hits),
+            (wave::HIT_TEXELS, hits),
+            (wave::SHADOW_RAYS, shadow_rays),
+            (wave::SHADOW_RAY_TEXELS, shadow_rays),
+            (wave::VISIBILITY, visibility),
+            (wave::PATHS, paths),
             (wave::HIT_SURFACES, &surfaces),
-            (wave::HIT_INSTANCES, &instances),
-            (wave::PATH_LISTS, &path_lists),
-            (wave::PATH_LIST_TEXELS, &path_lists),
+            (wave::HIT_INSTANCES, instances),
+            (wave::PATH_LISTS, path_lists),
+            (wave::PATH_LIST_TEXELS, path_lists),
             (wave::LAMP_LISTS, &lamp_lists),
             (wave::FEATURES, &features),
             (wave::GROUP_RADIANCE, &group_radiance),
             (wave::LAMP_GROUPS, &lamp_groups),
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
-        Ok(Self {
-            set,
-            capacity,
-            rays,
-            hits,
-            shadow_rays,
-            visibility,
-            paths,
-            instances,
-            path_lists,
-        })
+        Ok(Self { set, capacity, answers })
     }
 
     /// Descriptor set 2.
@@ -140,44 +125,5 @@ impl WaveBuffers {
     /// Number of paths in the first wave.
     pub(crate) fn first_wave_paths(&self) -> u32 {
         FIRST_PATHS.min(self.capacity)
-    }
-
-    /// [`Ray`] of every path.
-    pub fn rays(&self) -> &Buffer {
-        &self.rays
-    }
-
-    /// [`Hit`] of every path.
-    pub(crate) fn hits(&self) -> &Buffer {
-        &self.hits
-    }
-
-    /// [`ShadowRay`]s of the last group: direction `k` of path `i` at `k · path_count + i`.
-    pub fn shadow_rays(&self) -> &Buffer {
-        &self.shadow_rays
-    }
-
-    /// One word per shadow ray, in their order: 1 if it reaches the environment, else 0.
-    pub(crate) fn visibility(&self) -> &Buffer {
-        &self.visibility
-    }
-
-    /// [`PathState`] of every path.
-    pub fn paths(&self) -> &Buffer {
-        &self.paths
-    }
-
-    /// Buffers that the host answers in where it traces, with the parameters of the scene.
-    pub(crate) fn answers<'a>(&'a self, parameters: &'a Buffer) -> Answers<'a> {
-        Answers {
-            rays: &self.rays,
-            hits: &self.hits,
-            instances: &self.instances,
-            shadow_rays: &self.shadow_rays,
-            visibility: &self.visibility,
-            paths: &self.paths,
-            path_lists: &self.path_lists,
-            parameters,
-        }
     }
 }

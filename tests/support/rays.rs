@@ -176,10 +176,14 @@ impl OnDevice {
             (bindings::HITS, &hits),
             (bindings::HIT_INSTANCES, &instances),
         ];
-        let answers =
-            Answers { rays: &ray_buffer, hits: &hits, instances: &instances, ..self.no_answers() };
+        let answers = Answers {
+            rays: ray_buffer.clone(),
+            hits: hits.clone(),
+            instances: instances.clone(),
+            ..self.no_answers()
+        };
         let kernel = self.geometry.traversal().trace(schedule, Surfaces::default());
-        self.run(kernel, &own, answers, wave(rays.len(), 0));
+        self.run(kernel, &own, &answers, wave(rays.len(), 0));
         hits.download(rays.len()).unwrap()
     }
 
@@ -197,36 +201,35 @@ impl OnDevice {
             (bindings::VISIBILITY, &visibility),
         ];
         let answers = Answers {
-            hits: &hit_buffer,
-            shadow_rays: &ray_buffer,
-            visibility: &visibility,
+            hits: hit_buffer.clone(),
+            shadow_rays: ray_buffer.clone(),
+            visibility: visibility.clone(),
             ..self.no_answers()
         };
         let directions = (shadow_rays.len() / hits.len()) as u32;
         let kernel = self.geometry.traversal().shadow(schedule, Surfaces::default());
-        self.run(kernel, &own, answers, wave(hits.len(), directions));
+        self.run(kernel, &own, &answers, wave(hits.len(), directions));
         visibility.download(shadow_rays.len()).unwrap()
     }
 
-    fn no_answers(&self) -> Answers<'_> {
-        let none = &self.spare;
+    fn no_answers(&self) -> Answers {
+        let none = || self.spare.clone();
         Answers {
-            rays: none,
-            hits: none,
-            instances: none,
-            shadow_rays: none,
-            visibility: none,
-            paths: none,
-            path_lists: none,
-            parameters: none,
+            rays: none(),
+            hits: none(),
+            instances: none(),
+            shadow_rays: none(),
+            visibility: none(),
+            paths: none(),
+            path_lists: none(),
         }
     }
 
-    fn run(&self, kernel: Kernel, own: &[(Binding, &Buffer)], answers: Answers<'_>, wave: Wave) {
+    fn run(&self, kernel: Kernel, own: &[(Binding, &Buffer)], answers: &Answers, wave: Wave) {
         let device = super::device();
         let wave_set = set(&WAVE, own, &self.spare);
         let pass = Pass::new(device, kernel).unwrap();
-        let host = self.geometry.host_tracer().map(|tracer| (tracer, answers));
+        let host = self.geometry.host_tracer().map(|tracer| (tracer, answers, &self.spare));
         let mut recording = Recording::begin(device, 1, host, false).unwrap();
         recording.add(&pass, &[&self.scene, &wave_set, &self.film], &wave).unwrap();
         recording.finish().unwrap();

@@ -171,7 +171,7 @@ impl Race<'_> {
                 let paths = (wave.pixel_count * SAMPLES) as usize;
                 ms[index] +=
                     times.values().sum::<f64>() / f64::from(blocks.count * BLOCK_PIXELS * SAMPLES);
-                let paths: Vec<PathState> = runner.waves().paths().download(paths)?;
+                let paths: Vec<PathState> = runner.waves().answers.paths.download(paths)?;
                 let filter = runner.scene().filter();
                 for first in (0..wave.pixel_count as usize).step_by(BLOCK_PIXELS as usize) {
                     let samples = (0..SAMPLES).zip(paths.chunks(wave.pixel_count as usize));

@@ -79,12 +79,12 @@ impl Guided {
         runner.film().take_counters()?;
 
         let waves = runner.waves();
-        let hits: Vec<Hit> = waves.hits().download(samples as usize)?;
+        let hits: Vec<Hit> = waves.answers.hits.download(samples as usize)?;
         let is_hit = |hit: &&Hit| hit.material != NO_MATERIAL;
         let Some(first_hit) = hits.iter().find(is_hit) else { return Ok(None) };
         let count = (samples * per_group) as usize;
-        let shadow_rays: Vec<ShadowRay> = waves.shadow_rays().download(count)?;
-        let visible: Vec<u32> = waves.visibility().download(count)?;
+        let shadow_rays: Vec<ShadowRay> = waves.answers.shadow_rays.download(count)?;
+        let visible: Vec<u32> = waves.answers.visibility.download(count)?;
         let targets = if self.is_guided() {
             self.buffers.targets(count)?
         } else {
