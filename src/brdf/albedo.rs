@@ -18,10 +18,10 @@ const FINE_POINTS: u32 = 64;
 /// Points per dimension of the quadrature for the table that materials share.
 const COARSE_POINTS: u32 = 32;
 
-/// Direction of a given cosine. Stays just above the horizon, where a rough surface reflects nothing,
-/// to give the limit there.
-fn direction_of_cosine(cosine: f32) -> Vec3 {
-    let cosine = cosine.max(1e-4);
+/// Direction of the cosine at a node of a table, or between two. Stays just above the horizon, where a rough
+/// surface reflects nothing, to give the limit there.
+fn direction_at(node: f32) -> Vec3 {
+    let cosine = (node / BRDF_COSINE_INTERVALS as f32).max(1e-4);
     vec3((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine)
 }
 
@@ -57,13 +57,13 @@ pub(crate) fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
     let coat_albedo = |direction| ggx_albedo(direction, alpha, FINE_POINTS, fresnel).x.min(1.0);
     let mut coat: Vec<f32> = (0..BRDF_COSINE_NODES)
         .into_par_iter()
-        .map(|node| coat_albedo(direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32)))
+        .map(|node| coat_albedo(direction_at(node as f32)))
         .collect();
     // Next to the horizon, E falls steeply where the cosine is about α. Give the node there the
     // least value that keeps the line to the next node above E, so that coat and base together
     // never reflect more than they receive.
     let horizon = [0.02, 0.06, 0.12, 0.25, 0.5, 0.75].into_iter().map(|fraction| {
-        let e = coat_albedo(direction_of_cosine(fraction / BRDF_COSINE_INTERVALS as f32));
+        let e = coat_albedo(direction_at(fraction));
         (e - fraction * coat[1]) / (1.0 - fraction)
     });
     coat[0] = horizon.fold(coat[0], f32::max).min(1.0);
@@ -99,10 +99,8 @@ pub(crate) fn conductor_words(alpha: f32, eta: Vec3, k: Vec3) -> Vec<u32> {
     (0..BRDF_COSINE_NODES)
         .into_par_iter()
         .flat_map_iter(|node| {
-            let direction = direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32);
-            ggx_albedo(direction, alpha, FINE_POINTS, fresnel)
-                .clamp(Vec3::ZERO, Vec3::ONE)
-                .to_array()
+            let albedo = ggx_albedo(direction_at(node as f32), alpha, FINE_POINTS, fresnel);
+            albedo.clamp(Vec3::ZERO, Vec3::ONE).to_array()
         })
         .map(f32::to_bits)
         .collect()
@@ -123,7 +121,7 @@ pub(crate) fn ggx_words() -> &'static [u32] {
                 let (row, node) = (index / BRDF_COSINE_NODES, index % BRDF_COSINE_NODES);
                 let roughness = row as f32 / GGX_ROUGHNESS_INTERVALS as f32;
                 let alpha = (roughness * roughness).max(SMALLEST_ALPHA);
-                let direction = direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32);
+                let direction = direction_at(node as f32);
                 let fresnel = |cosine: f32| {
                     let rise = schlick_rise(cosine);
                     vec3(1.0 - rise, rise, 0.0)
@@ -132,9 +130,7 @@ pub(crate) fn ggx_words() -> &'static [u32] {
                 [factors.x, factors.y]
             })
             .collect();
-        let rise = (0..BRDF_COSINE_NODES).map(|node| {
-            diffuse_rise(direction_of_cosine(node as f32 / BRDF_COSINE_INTERVALS as f32))
-        });
+        let rise = (0..BRDF_COSINE_NODES).map(|node| diffuse_rise(direction_at(node as f32)));
         ggx.into_iter().flatten().chain(rise).map(f32::to_bits).collect()
     });
     &WORDS

@@ -35,9 +35,11 @@ impl MaterialTables {
         let mut tables = Self { materials: Vec::with_capacity(materials.len()), words: vec![0] };
         let mut measured_offsets = HashMap::new();
         let mut ggx_offset = None;
+        // All GGX surfaces with a Schlick reflectance share one table.
+        let mut ggx_table =
+            |tables: &mut Self| *ggx_offset.get_or_insert_with(|| tables.append(ggx_words()));
         for material in materials {
             let mut converted = structs::Material::default();
-            let mut words = Vec::new();
             match &material.kind {
                 MaterialKind::Diffuse { reflectance } => {
                     converted.kind = MATERIAL_DIFFUSE;
@@ -48,7 +50,8 @@ impl MaterialTables {
                     converted.reflectance = diffuse.to_array();
                     converted.alpha = alpha.max(SMALLEST_ALPHA);
                     converted.ior = *ior;
-                    words = plastic_words(*diffuse, converted.alpha, *ior);
+                    let words = plastic_words(*diffuse, converted.alpha, *ior);
+                    converted.table_offset = tables.append(&words);
                 }
                 MaterialKind::Conductor { alpha, fresnel } => {
                     converted.kind = MATERIAL_CONDUCTOR;
@@ -56,13 +59,14 @@ impl MaterialTables {
                     match fresnel {
                         ConductorFresnel::Schlick { reflectance } => {
                             converted.reflectance = reflectance.to_array();
-                            converted.table_offset = ggx_table(&mut tables.words, &mut ggx_offset);
+                            converted.table_offset = ggx_table(&mut tables);
                         }
                         ConductorFresnel::Exact { eta, k } => {
                             converted.ior = 1.0;
                             converted.eta = eta.to_array();
                             converted.k = k.to_array();
-                            words = conductor_words(converted.alpha, *eta, *k);
+                            let words = conductor_words(converted.alpha, *eta, *k);
+                            converted.table_offset = tables.append(&words);
                         }
                     }
                 }
@@ -77,7 +81,7 @@ impl MaterialTables {
                         .map(|reflectance| reflectance * own.specular)
                         .to_array();
                     converted.k = [own.specular; 3];
-                    converted.table_offset = ggx_table(&mut tables.words, &mut ggx_offset);
+                    converted.table_offset = ggx_table(&mut tables);
                 }
                 MaterialKind::Mirror { reflectance } => {
                     converted.kind = MATERIAL_MIRROR;
@@ -105,29 +109,21 @@ impl MaterialTables {
                             if (tables.words.len() + MEASURED_GRID_OFFSET as usize) % 2 == 1 {
                                 tables.words.push(0);
                             }
-                            let first = tables.words.len() as u32;
-                            tables.words.extend_from_slice(table.words());
-                            first
+                            tables.append(table.words())
                         });
                 }
-            }
-            if !words.is_empty() {
-                converted.table_offset = tables.words.len() as u32;
-                tables.words.append(&mut words);
             }
             tables.materials.push(converted);
         }
         Ok(tables)
     }
-}
 
-/// Offset of the table that all GGX surfaces with a Schlick reflectance share; appends it on first use.
-fn ggx_table(words: &mut Vec<u32>, offset: &mut Option<u32>) -> u32 {
-    *offset.get_or_insert_with(|| {
-        let first = words.len() as u32;
-        words.extend_from_slice(ggx_words());
+    /// Appends a table and returns its offset.
+    fn append(&mut self, words: &[u32]) -> u32 {
+        let first = self.words.len() as u32;
+        self.words.extend_from_slice(words);
         first
-    })
+    }
 }
 
 /// Fails if the measured tables do not fit into one buffer.
