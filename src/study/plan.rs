@@ -65,22 +65,11 @@ impl Options {
     /// Returns these options, with those of `below` where one is absent.
     #[must_use]
     pub fn over(self, below: Self) -> Self {
-        Self {
-            samplers: self.samplers.or(below.samplers),
-            spp: self.spp.or(below.spp),
-            time: self.time.or(below.time),
-            seeds: self.seeds.or(below.seeds),
-            size: self.size.or(below.size),
-            shadow_rays: self.shadow_rays.or(below.shadow_rays),
-            depth: self.depth.or(below.depth),
-            reference_sampler: self.reference_sampler.or(below.reference_sampler),
-            reference_spp: self.reference_spp.or(below.reference_spp),
-            reference_check: self.reference_check.or(below.reference_check),
-            overhead: self.overhead.or(below.overhead),
-            overhead_baseline: self.overhead_baseline.or(below.overhead_baseline),
-            overhead_spp: self.overhead_spp.or(below.overhead_spp),
-            overhead_repetitions: self.overhead_repetitions.or(below.overhead_repetitions),
+        macro_rules! layered {
+            ($($option:ident)*) => { Self { $($option: self.$option.or(below.$option)),* } };
         }
+        layered!(samplers spp time seeds size shadow_rays depth reference_sampler reference_spp
+            reference_check overhead overhead_baseline overhead_spp overhead_repetitions)
     }
 }
 
