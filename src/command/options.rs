@@ -2,6 +2,7 @@
 
 use std::{
     path::{Path, PathBuf},
+    str::FromStr,
     sync::Arc,
     time::Duration,
 };
@@ -173,12 +174,17 @@ pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
         .ok_or_else(|| format!("expected WIDTHxHEIGHT, each 1 to 16384, found {text:?}"))
 }
 
+/// Parses so many numbers between commas.
+fn parse_numbers<T: FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
+    let numbers = text.split(',').map(|part| part.trim().parse().ok());
+    numbers.collect::<Option<Vec<T>>>()?.try_into().ok()
+}
+
 /// Parses `x0,y0,x1,y1` in pixels, upper bounds excluded.
 pub(crate) fn parse_crop(text: &str) -> Result<Window, String> {
-    let numbers: Option<Vec<u32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-    match numbers.as_deref() {
-        Some(&[x0, y0, x1, y1]) if x0 < x1 && y0 < y1 => {
-            Ok(Window { x: x0, y: y0, width: x1 - x0, height: y1 - y0 })
+    match parse_numbers(text) {
+        Some([x, y, x1, y1]) if x < x1 && y < y1 => {
+            Ok(Window { x, y, width: x1 - x, height: y1 - y })
         }
         _ => {
             Err(format!("expected x0,y0,x1,y1 in pixels with x0 < x1 and y0 < y1, found {text:?}"))
@@ -188,19 +194,14 @@ pub(crate) fn parse_crop(text: &str) -> Result<Window, String> {
 
 /// Parses `x,y` in pixels.
 pub(crate) fn parse_pixel(text: &str) -> Result<[u32; 2], String> {
-    text.split_once(',')
-        .and_then(|(x, y)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]))
+    parse_numbers(text)
         .ok_or_else(|| format!("expected x,y in pixels from the upper left, found {text:?}"))
 }
 
 /// Parses `x,y,z` in metres.
 fn parse_point(text: &str) -> Result<[f32; 3], String> {
-    let numbers: Option<Vec<f32>> = text
-        .split(',')
-        .map(|part| part.trim().parse().ok().filter(|number: &f32| number.is_finite()))
-        .collect();
-    numbers
-        .and_then(|numbers| numbers.try_into().ok())
+    parse_numbers(text)
+        .filter(|point: &[f32; 3]| point.iter().all(|number| number.is_finite()))
         .ok_or_else(|| format!("expected x,y,z, found {text:?}"))
 }
 
