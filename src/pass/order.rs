@@ -12,7 +12,7 @@ use super::{
 use crate::shader::{
     constants::{
         AOV_ALBEDO, AOV_MATERIALS, AOV_NORMAL, AOV_OBJECTS, AOV_POSITION, CONSTANT_ONLY_SPECULAR,
-        PATH_LISTS, TRAINING_WAVE,
+        PATH_LISTS, SURFACES_EMITTING, SURFACES_SPECULAR, SURFACES_TEXTURED, TRAINING_WAVE,
     },
     structs::Wave,
 };
@@ -195,12 +195,12 @@ impl<'a> Order<'a> {
     }
 
     fn emits(&self) -> bool {
-        self.is_lit() && self.settings.surfaces.emits()
+        self.is_lit() && self.settings.surfaces.has(SURFACES_EMITTING)
     }
 
     /// True if paths go on from their last vertices.
     fn goes_on(&self) -> bool {
-        self.emits() || self.is_lit() && self.settings.surfaces.has_specular()
+        self.emits() || self.is_lit() && self.settings.surfaces.has(SURFACES_SPECULAR)
     }
 
     /// Begins a vertex. After the last one no light is sampled.
@@ -234,7 +234,7 @@ impl<'a> Order<'a> {
     }
 
     fn read_textures(&mut self) {
-        if self.settings.surfaces.is_textured() {
+        if self.settings.surfaces.has(SURFACES_TEXTURED) {
             self.add_over("texture", Domain::Surfaces);
         }
     }
@@ -306,8 +306,8 @@ impl<'a> Order<'a> {
         let is_asked_for = aovs & FEATURES != 0 && is_training == 0;
         if is_asked_for && vertex == 0 {
             self.add_over("features", Domain::Arrivals);
-        } else if is_asked_for && vertex < FEATURE_VERTICES && surfaces.has_specular() {
-            if vertex == self.vertices && surfaces.is_textured() {
+        } else if is_asked_for && vertex < FEATURE_VERTICES && surfaces.has(SURFACES_SPECULAR) {
+            if vertex == self.vertices && surfaces.has(SURFACES_TEXTURED) {
                 self.add_over("texture", Domain::Arrivals);
             }
             self.add_over("features", Domain::Arrivals);
@@ -320,7 +320,7 @@ impl<'a> Order<'a> {
             let guided = samples.then(|| self.steps.bounce(&self.wave)).flatten();
             self.add(guided.unwrap_or_else(|| self.bounce_by_brdf(false)));
         } else if self.goes_on() {
-            self.add(self.bounce_by_brdf(!self.settings.surfaces.emits()));
+            self.add(self.bounce_by_brdf(!self.settings.surfaces.has(SURFACES_EMITTING)));
         }
     }
 

@@ -5,8 +5,7 @@ use crate::{
     scene::material::{Material, MaterialKind},
     shader::constants::{
         CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, SPECULAR_KINDS, SURFACES_EMITTING,
-        SURFACES_INSTANCED, SURFACES_LAMP_CELLS, SURFACES_ONE_SIDED, SURFACES_PASSING,
-        SURFACES_SPECULAR, SURFACES_TEXTURED,
+        SURFACES_ONE_SIDED, SURFACES_PASSING, SURFACES_SPECULAR, SURFACES_TEXTURED,
     },
 };
 
@@ -31,34 +30,14 @@ impl Surfaces {
         [&own[..], &self.access.constants()].concat()
     }
 
-    /// True if textures or vertex colours vary a material.
-    pub(crate) fn is_textured(&self) -> bool {
-        self.features & SURFACES_TEXTURED != 0
-    }
-
-    /// True if the tree has two levels, and hits name an instance.
-    pub(crate) fn is_instanced(&self) -> bool {
-        self.features & SURFACES_INSTANCED != 0
-    }
-
-    /// True if some material emits light.
-    pub(crate) fn emits(&self) -> bool {
-        self.features & SURFACES_EMITTING != 0
-    }
-
-    /// True if lamps are chosen by place.
-    pub(crate) fn has_lamp_cells(&self) -> bool {
-        self.features & SURFACES_LAMP_CELLS != 0
+    /// True if the scene needs what a bit `SURFACES_…` stands for.
+    pub(crate) fn has(&self, feature: u32) -> bool {
+        self.features & feature != 0
     }
 
     /// True if some material is not specular, so that the pixels of a cohort can share its light.
     pub(crate) fn can_share(&self) -> bool {
         self.material_kinds & !SPECULAR_KINDS != 0
-    }
-
-    /// True if paths meet surfaces at which no light is sampled.
-    pub(crate) fn has_specular(&self) -> bool {
-        self.features & SURFACES_SPECULAR != 0
     }
 }
 

@@ -8,7 +8,9 @@ use crate::{
     gpu::{Buffer, Capabilities, DescriptorSet, Device},
     shader::{
         bindings::{WAVE, wave},
-        constants::{PATH_LISTS, WORKGROUP_SIZE},
+        constants::{
+            PATH_LISTS, SURFACES_INSTANCED, SURFACES_LAMP_CELLS, SURFACES_TEXTURED, WORKGROUP_SIZE,
+        },
         structs::{Feature, Hit, PathState, Ray, ShadowRay, Surface},
     },
 };
@@ -76,14 +78,14 @@ impl WaveBuffers {
         let answers = Answers {
             rays: make("rays", paths, size_of::<Ray>())?,
             hits: make("hits", paths, size_of::<Hit>())?,
-            instances: make_if(of.is_instanced(), "hit instances", size_of::<u32>())?,
+            instances: make_if(of.has(SURFACES_INSTANCED), "hit instances", size_of::<u32>())?,
             shadow_rays: make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?,
             visibility: make("visibility", shadow_ray_count, size_of::<u32>())?,
             paths: make("paths", paths, size_of::<PathState>())?,
             path_lists: Buffer::new(device, "path lists", path_list_bytes(paths))?,
         };
-        let surfaces = make_if(of.is_textured(), "hit surfaces", size_of::<Surface>())?;
-        let lamp_lists = make_if(of.has_lamp_cells(), "lamp lists", size_of::<u32>())?;
+        let surfaces = make_if(of.has(SURFACES_TEXTURED), "hit surfaces", size_of::<Surface>())?;
+        let lamp_lists = make_if(of.has(SURFACES_LAMP_CELLS), "lamp lists", size_of::<u32>())?;
         let features = make_if(demand.has_features, "features", size_of::<Feature>())?;
         let radiance_count = (groups * paths).max(1);
         let group_radiance = make("group radiance", radiance_count, size_of::<[f32; 3]>())?;
