@@ -21,16 +21,6 @@ pub struct Intersection {
     pub distance: f32,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Work {
-    /// Calls of the step function.
-    pub steps: u32,
-    /// Nodes visited.
-    pub nodes: u32,
-    /// Triangles tested.
-    pub triangles: u32,
-}
-
 /// Initial distance, before a ray has met anything.
 const FAR_AWAY: f32 = 3.0e38;
 
@@ -40,7 +30,7 @@ const RAY_OFFSET_SHARE: f32 = 3.814_697_3e-6;
 impl Accel {
     /// Finds the first triangle that the ray meets; `direction` is a unit vector.
     pub fn closest(&self, origin: Vec3, direction: Vec3) -> Option<Intersection> {
-        self.closest_with_work(origin, direction).0
+        self.closest_before(origin, direction, FAR_AWAY)
     }
 
     /// As [`Accel::closest`], before so many metres.
@@ -54,17 +44,6 @@ impl Accel {
         ray.distance = farthest;
         while ray.step() {}
         ray.hit()
-    }
-
-    /// As [`Accel::closest`], and returns the work done.
-    pub(crate) fn closest_with_work(
-        &self,
-        origin: Vec3,
-        direction: Vec3,
-    ) -> (Option<Intersection>, Work) {
-        let mut ray = Traversal::start(self, origin, direction, false);
-        while ray.step() {}
-        (ray.hit(), ray.work)
     }
 
     /// True if the ray meets any triangle; `direction` is a unit vector.
@@ -167,7 +146,6 @@ struct Traversal<'a> {
     triangles_next: UVec2,
     stack: [UVec2; BVH_STACK_ENTRIES as usize],
     stack_size: usize,
-    work: Work,
 }
 
 impl<'a> Traversal<'a> {
@@ -194,7 +172,6 @@ impl<'a> Traversal<'a> {
             triangles_next: UVec2::ZERO,
             stack: [UVec2::ZERO; BVH_STACK_ENTRIES as usize],
             stack_size: 0,
-            work: Work::default(),
         };
         ray.see(direction);
         ray
@@ -274,7 +251,6 @@ impl<'a> Traversal<'a> {
 
     /// Visits at most one node and one triangle. Returns false when the ray is finished.
     fn step(&mut self) -> bool {
-        self.work.steps += 1;
         let is_instanced = self.accel.is_instanced();
         if is_instanced {
             self.change_level();
@@ -299,7 +275,6 @@ impl<'a> Traversal<'a> {
     }
 
     fn visit_node(&mut self) {
-        self.work.nodes += 1;
         let hits = self.nodes_waiting.y;
         let bit = 31 - hits.leading_zeros();
         self.nodes_waiting.y &= !(1 << bit);
@@ -348,7 +323,6 @@ impl<'a> Traversal<'a> {
     }
 
     fn test_triangle(&mut self) {
-        self.work.triangles += 1;
         let bit = 31 - self.triangles_waiting.y.leading_zeros();
         self.triangles_waiting.y &= !(1 << bit);
         let triangle = self.triangles_waiting.x + bit;
