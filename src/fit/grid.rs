@@ -1,13 +1,13 @@
 //! Environment map as a fit sees it: radiance per cell of a lat-long grid in the frame of the map,
 //! cut into patches and compared with a mixture.
 
-use std::{collections::BinaryHeap, f64::consts::PI};
+use std::f64::consts::PI;
 
 use glam::{DVec3, Vec2, Vec3};
 
 use super::{config, points::Patch};
 use crate::{
-    math::{colour::luminance, frame::direction_from_lat_long, refinement::Queued},
+    math::{colour::luminance, frame::direction_from_lat_long, refinement::refine},
     scene::EnvironmentMap,
 };
 
@@ -202,16 +202,12 @@ impl Grid {
         let measured = |rectangle: Rectangle| (rectangle, measure(rectangle));
         let is_cell = |r: &Rectangle| r.x1 - r.x0 == 1 && r.y1 - r.y0 == 1;
         let priority = |(r, ColouredPatch { patch, .. }): &(Rectangle, ColouredPatch)| {
-            if is_cell(r) { 0.0 } else { (patch.energy * patch.solid_angle).sqrt() }
+            let size = (patch.energy * patch.solid_angle).sqrt();
+            (!is_cell(r) && size > 0.0).then_some(size)
         };
-        let root = measured(Rectangle { x0: 0, y0: 0, x1: self.width, y1: self.height });
-        let mut queue = BinaryHeap::from([Queued { priority: priority(&root), index: 0 }]);
-        let mut pieces = vec![root];
-        while pieces.len() < count {
-            let Some(Queued { index, .. }) = queue.pop().filter(|largest| largest.priority > 0.0)
-            else {
-                break;
-            };
+        let mut pieces =
+            vec![measured(Rectangle { x0: 0, y0: 0, x1: self.width, y1: self.height })];
+        refine(&mut pieces, count, priority, |pieces, index| {
             let (parent, _) = pieces[index];
             let Rectangle { x0, y0, x1, y1 } = parent;
             // Halve the longer side, as measured on the sphere.
@@ -227,10 +223,7 @@ impl Grid {
             };
             pieces[index] = measured(first);
             pieces.push(measured(second));
-            for index in [index, pieces.len() - 1] {
-                queue.push(Queued { priority: priority(&pieces[index]), index });
-            }
-        }
+        });
         // Resolve heavy cells: for a sun of a few texels, radiance within a cell matters.
         let total: f64 = pieces.iter().map(|(_, patch)| patch.patch.energy).sum();
         let mut patches: Vec<ColouredPatch> = pieces.iter().map(|(_, patch)| *patch).collect();

@@ -1,12 +1,12 @@
 //! BRDF × cosine for one view as a fit sees it: samples on an equal-area grid of the hemisphere,
 //! finest where the energy is.
 
-use std::{collections::BinaryHeap, f64::consts::PI};
+use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
 use super::{config, points::Patch};
-use crate::math::refinement::Queued;
+use crate::math::refinement::refine;
 
 /// Initial cells along each side of the square.
 const FIRST_CELLS: u32 = 24;
@@ -87,12 +87,10 @@ impl Cell {
         self.samples.iter().map(|sample| sample.0).sum::<DVec3>().normalize()
     }
 
-    fn priority(&self) -> f64 {
-        if self.depth >= MAX_DEPTH {
-            return 0.0;
-        }
+    fn priority(&self) -> Option<f64> {
         let sum: f64 = self.samples.iter().map(|sample| sample.1).sum();
-        0.5 * self.solid_angle() * sum.sqrt()
+        let priority = 0.5 * self.solid_angle() * sum.sqrt();
+        (self.depth < MAX_DEPTH && priority > 0.0).then_some(priority)
     }
 
     fn children(&self, function: &dyn Fn(DVec3) -> f64) -> [Self; 4] {
@@ -108,33 +106,23 @@ impl Cell {
 pub(crate) fn sample_hemisphere(function: &dyn Fn(DVec3) -> f64, peak: DVec3) -> HemisphereTarget {
     let first = |index| Cell::new(0, index % FIRST_CELLS, index / FIRST_CELLS, function);
     let mut cells: Vec<Cell> = (0..FIRST_CELLS * FIRST_CELLS).map(first).collect();
-    let mut queue = BinaryHeap::new();
+    let split = |cells: &mut Vec<Cell>, index: usize| {
+        let [first, rest @ ..] = cells[index].children(function);
+        cells[index] = first;
+        cells.extend(rest);
+    };
     let mut index = 0;
     while index < cells.len() {
         let cell = cells[index];
         let size = cell.solid_angle().sqrt();
         if cell.depth < config::PEAK_DEPTH && cell.middle().distance(peak) < 1.2 * size {
-            let [first, rest @ ..] = cell.children(function);
-            cells[index] = first;
-            cells.extend(rest);
+            split(&mut cells, index);
         } else {
-            queue.push(Queued { priority: cell.priority(), index });
             index += 1;
         }
     }
-    while cells.len() + 3 <= config::HEMISPHERE_CELLS {
-        let Some(Queued { index, .. }) = queue.pop().filter(|largest| largest.priority > 0.0)
-        else {
-            break;
-        };
-        let [first, rest @ ..] = cells[index].children(function);
-        cells[index] = first;
-        queue.push(Queued { priority: first.priority(), index });
-        for cell in rest {
-            queue.push(Queued { priority: cell.priority(), index: cells.len() });
-            cells.push(cell);
-        }
-    }
+    // Each split adds three cells.
+    refine(&mut cells, config::HEMISPHERE_CELLS - 2, Cell::priority, split);
     let mut target = HemisphereTarget { samples: Vec::new(), patches: Vec::new() };
     for cell in &cells {
         let quarter = 0.25 * cell.solid_angle();

@@ -1,11 +1,7 @@
 //! Lamps and emitting triangles → an alias table by power, densities over triangles, and clusters for the
 //! choice by place.
 
-use std::{
-    collections::{BTreeMap, BinaryHeap},
-    f32::consts::PI,
-    ops::Range,
-};
+use std::{collections::BTreeMap, f32::consts::PI, ops::Range};
 
 use glam::Vec3;
 
@@ -14,7 +10,7 @@ use crate::{
     math::{
         alias::{alias_table, probabilities},
         colour::luminance,
-        refinement::Queued,
+        refinement::refine,
     },
     scene::{
         Lamp, Scene, instance,
@@ -230,36 +226,23 @@ fn clusters(sources: &[Source], groups: Vec<Vec<u32>>, small: f32) -> Vec<Vec<u3
     let are_many = near.len() > MOST_CLUSTERS;
     let near = if are_many { vec![near.concat()] } else { near };
     let small = if are_many { 0.0 } else { small };
-    let mut waiting = BinaryHeap::new();
     let centre = |index: &u32| source(index).centre.unwrap_or_default();
     let extent = |members: &[u32]| {
         instance::bounds(members.iter().map(centre)).map_or(Vec3::ZERO, |[low, high]| high - low)
     };
-    let priority = |members: &[u32]| {
+    let priority = |members: &Vec<u32>| {
         let power: f64 = members.iter().map(|index| source(index).power).sum();
         let width = extent(members).max_element();
         (width > small).then(|| power * f64::from(width))
     };
-    for members in near {
-        let index = clusters.len();
-        waiting.extend(priority(&members).map(|priority| Queued { priority, index }));
-        clusters.push(members);
-    }
-    while clusters.len() < MOST_CLUSTERS {
-        let Some(Queued { index, .. }) = waiting.pop() else { break };
-        let mut members = std::mem::take(&mut clusters[index]);
-        let axis = extent(&members).max_position();
+    clusters.extend(near);
+    refine(&mut clusters, MOST_CLUSTERS, priority, |clusters, index| {
+        let members = &mut clusters[index];
+        let axis = extent(members).max_position();
         members.sort_by(|a, b| centre(a)[axis].total_cmp(&centre(b)[axis]).then(a.cmp(b)));
         let upper = members.split_off(members.len() / 2);
-        for (index, members) in [(index, members), (clusters.len(), upper)] {
-            waiting.extend(priority(&members).map(|priority| Queued { priority, index }));
-            if index == clusters.len() {
-                clusters.push(members);
-            } else {
-                clusters[index] = members;
-            }
-        }
-    }
+        clusters.push(upper);
+    });
     clusters
 }
 

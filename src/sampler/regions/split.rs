@@ -1,13 +1,13 @@
 //! Splits the cells of the map greedily into rectangles: energy and weight of every cell →
 //! rectangles with little E^¼ · Ω^¾, where E is the weighted energy and Ω the weighted solid angle.
 
-use std::{collections::BinaryHeap, ops::Range};
+use std::ops::Range;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{
-    math::{colour::luminance, refinement::Queued},
+    math::{colour::luminance, refinement::refine},
     scene::environment::{EnvironmentMap, mean_sine},
 };
 
@@ -199,29 +199,22 @@ fn list_order(next: &[usize]) -> Vec<usize> {
 pub fn split_greedily(sums: &SummedAreas, region_count: usize) -> Vec<Rectangle> {
     let whole = Rectangle { first: [0, 0], size: [sums.cells.width, sums.cells.rows], parent: 0 };
     let mut rectangles = vec![whole];
-    let mut queue = BinaryHeap::from([Queued { priority: sums.cost(whole), index: 0 }]);
     // Next rectangle in the order of the tree
     let mut next = vec![usize::MAX];
-    while rectangles.len() < region_count {
-        // Stop at black rectangles, which need no split.
-        let Some(Queued { index, priority }) = queue.pop() else { break };
-        if priority <= 0.0 {
-            break;
-        }
-        let Some([low, high]) = sums.split(rectangles[index]) else { continue };
+    // Black rectangles need no split.
+    let priority = |rectangle: &Rectangle| Some(sums.cost(*rectangle)).filter(|cost| *cost > 0.0);
+    refine(&mut rectangles, region_count, priority, |rectangles, index| {
+        let Some([low, high]) = sums.split(rectangles[index]) else { return };
         rectangles[index] = low;
         rectangles.push(high);
         next.push(next[index]);
         next[index] = rectangles.len() - 1;
-        for index in [index, rectangles.len() - 1] {
-            queue.push(Queued { priority: sums.cost(rectangles[index]), index });
-        }
         if rectangles.len() <= PARENT_COUNT {
             // Later halves inherit the parent that is set last.
             for (rank, index) in list_order(&next).into_iter().enumerate() {
                 rectangles[index].parent = rank;
             }
         }
-    }
+    });
     list_order(&next).into_iter().map(|index| rectangles[index]).collect()
 }
