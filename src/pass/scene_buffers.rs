@@ -65,8 +65,30 @@ impl SceneBuffers {
         accel: impl Borrow<Accel>,
     ) -> Result<Self> {
         let start = Instant::now();
-        let Parts { geometry, textures, lamps, lamp_cells, light_groups, tables, mattes } =
-            Parts::new(device, scene, accel.borrow())?;
+        let built = accel.borrow();
+        let mut surface_tables = SurfaceTables::new(&scene.materials);
+        let light_groups = LightGroups::new(scene);
+        let lamps = LampTables::new(scene, built, &light_groups);
+        // Lamps are chosen by place where there are many clusters.
+        let has_cells = !lamps.clusters.is_empty();
+        let lamp_cells = has_cells.then(|| LampCells::new(scene, built, &lamps));
+        for (surface, density) in surface_tables.surfaces.iter_mut().zip(&lamps.emission_densities)
+        {
+            surface.emission_density = *density;
+        }
+        for (surface, material) in surface_tables.surfaces.iter_mut().zip(&scene.materials) {
+            surface.light_group = light_groups.of_surface(&material.surface);
+        }
+        let attributes = TriangleAttributes::new(&scene.geometry, built, surface_tables.attributes);
+        let textures = TextureBuffers::new(device, &surface_tables, &attributes)?;
+        drop(attributes);
+        let tables = MaterialTables::new(&scene.materials)?;
+        let passing =
+            PassingSurfaces::new(&scene.materials, &tables.materials, &surface_tables, &textures);
+        drop(surface_tables);
+        let geometry =
+            GeometryBuffers::new(device, built)?.traced_by_host(device, built, passing)?;
+        let mattes = Mattes::new(scene, built);
         drop(accel);
         let mut host_ms = BTreeMap::new();
         let material_kinds =
@@ -270,43 +292,5 @@ fn with_camera(parameters: SceneParameters, camera: &Camera) -> SceneParameters 
         camera_tan_half_fov: (0.5 * camera.vertical_fov_deg).to_radians().tan(),
         camera_forward: forward.into(),
         ..parameters
-    }
-}
-
-/// Parts of a scene that need its triangles in BVH order.
-struct Parts {
-    geometry: GeometryBuffers,
-    textures: TextureBuffers,
-    lamps: LampTables,
-    /// Choice by place, where there are many clusters.
-    lamp_cells: Option<LampCells>,
-    light_groups: LightGroups,
-    tables: MaterialTables,
-    mattes: Mattes,
-}
-
-impl Parts {
-    fn new(device: &Arc<Device>, scene: &Scene, accel: &Accel) -> Result<Self> {
-        let mut surfaces = SurfaceTables::new(&scene.materials);
-        let light_groups = LightGroups::new(scene);
-        let lamps = LampTables::new(scene, accel, &light_groups);
-        let has_cells = !lamps.clusters.is_empty();
-        let lamp_cells = has_cells.then(|| LampCells::new(scene, accel, &lamps));
-        for (surface, density) in surfaces.surfaces.iter_mut().zip(&lamps.emission_densities) {
-            surface.emission_density = *density;
-        }
-        for (surface, material) in surfaces.surfaces.iter_mut().zip(&scene.materials) {
-            surface.light_group = light_groups.of_surface(&material.surface);
-        }
-        let attributes = TriangleAttributes::new(&scene.geometry, accel, surfaces.attributes);
-        let textures = TextureBuffers::new(device, &surfaces, &attributes)?;
-        drop(attributes);
-        let tables = MaterialTables::new(&scene.materials)?;
-        let passing =
-            PassingSurfaces::new(&scene.materials, &tables.materials, &surfaces, &textures);
-        let geometry =
-            GeometryBuffers::new(device, accel)?.traced_by_host(device, accel, passing)?;
-        let mattes = Mattes::new(scene, accel);
-        Ok(Self { geometry, textures, lamps, lamp_cells, light_groups, tables, mattes })
     }
 }

@@ -212,11 +212,6 @@ impl Arguments {
         Ok(frames.numbers().map(Some).collect())
     }
 
-    /// Time of a frame, seconds.
-    pub(super) fn time_of(&self, frame: u32) -> f64 {
-        f64::from(frame) / self.fps
-    }
-
     /// Arguments of one frame, with names and random numbers of its own.
     pub(super) fn of_frame(&self, frame: Option<u32>) -> Self {
         let mut own = self.clone();

@@ -93,7 +93,7 @@ impl Sequence {
         let start = Instant::now();
         let loading = format!("loading {}", arguments.scene.display());
         let patience = Patience::new(&loading, arguments.quiet);
-        let time = frame.map(|frame| arguments.time_of(frame));
+        let time = frame.map(|frame| f64::from(frame) / arguments.fps);
         let mut scene = arguments.scene_options.load_at(&arguments.scene, time)?;
         scene.warnings.iter().for_each(|warning| self.warn(warning));
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
