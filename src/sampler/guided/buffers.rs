@@ -303,13 +303,6 @@ impl GuideBuffers {
             arrivals.map(|arrivals| arrivals.counted(self.learned.cell_count())).transpose()?;
         Ok(GuideState {
             origin: self.origin.clone(),
-            samples: 0,
-            rebuilt_at: 0,
-            is_open: false,
-            arm: None,
-            arm_since: 0,
-            races: 0,
-            tag: 0,
             rectangles: self.partition.rectangles(),
             keys: self.learned.keys().iter().map(|key| key.0).collect(),
             refined: self.learned.refined(),
@@ -320,6 +313,7 @@ impl GuideBuffers {
             missing: missing.into_iter().map(|key| !key).collect(),
             arrivals: self.learned.arrivals(),
             pending_arrivals: pending_arrivals.unwrap_or_default(),
+            ..GuideState::default()
         })
     }
 

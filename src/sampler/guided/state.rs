@@ -3,8 +3,9 @@
 //! A file is one line of JSON, then [packed](super::packing) words: the arrays of [`GuideState`] from
 //! `rectangles` on, in their order. The header holds the SHA-256 of both.
 
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
+use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -30,8 +31,9 @@ const MAX_ARRIVAL_RAYS: f32 = 1e10;
 /// Upper bound of their light, such that its product with the rays of all cells stays finite.
 const MAX_ARRIVAL_LIGHT: f32 = 1e20;
 
-/// State that lets a renderer go on learning where another stopped.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// State that lets a renderer go on learning where another stopped. The header of its file holds all but the
+/// arrays.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GuideState {
     /// Scene that the guide was learned in.
     pub origin: Origin,
@@ -48,30 +50,41 @@ pub struct GuideState {
     /// Number of races.
     pub races: u32,
     /// Tag of the guides that this one went on from, see [`GuideState::epoch_tag`]; 0 for none.
+    #[serde(default)]
     pub tag: u32,
     /// First column and row, number of columns and rows, and parent of every region.
+    #[serde(skip)]
     pub rectangles: Vec<[u32; 5]>,
     /// Key of every cell, the faces first.
+    #[serde(skip)]
     pub keys: Vec<u32>,
     /// Indices of the cells whose children may be cells.
+    #[serde(skip)]
     pub refined: Vec<u32>,
     /// Counts per cell and region up to the last rebuild: trials and hits, in sixteenths of rays,
     /// and the sum of the responses of the hits.
+    #[serde(skip)]
     pub counts: Vec<CountWords>,
     /// Visible rays and their c p_B / q per cell and octave of light up to the last rebuild, see
     /// [`ShareEvidence`](super::ShareEvidence).
+    #[serde(skip)]
     pub shares: Vec<u32>,
     /// Counts since the last rebuild, trials and hits in rays; empty where there are none.
+    #[serde(skip)]
     pub pending: Vec<CountWords>,
     /// Shares since the last rebuild; empty where there are none.
+    #[serde(skip)]
     pub pending_shares: Vec<u32>,
     /// Slots of the table of keys that passes looked up and did not find since the last rebuild: which keys
     /// come in a full table depends on where others lie. Complements of keys, so that an empty slot is 0.
+    #[serde(skip)]
     pub missing: Vec<u32>,
     /// Bounce rays and light per cell and direction up to the last rebuild, as bits of floats;
     /// empty where bounces do not teach.
+    #[serde(skip)]
     pub arrivals: Vec<ArrivalWords>,
     /// Bounce rays and units of light since the last rebuild; empty where there are none.
+    #[serde(skip)]
     pub pending_arrivals: Vec<ArrivalWords>,
 }
 
@@ -91,19 +104,12 @@ pub struct Origin {
 }
 
 #[derive(Clone, Serialize, Deserialize)]
-struct Header {
+struct Header<'a> {
     format: String,
     version: u32,
     checksum: String,
-    origin: Origin,
-    samples: u32,
-    rebuilt_at: u32,
-    is_open: bool,
-    arm: Option<Arm>,
-    arm_since: u32,
-    races: u32,
-    #[serde(default)]
-    tag: u32,
+    #[serde(flatten)]
+    state: Cow<'a, GuideState>,
     cells: usize,
     refined: usize,
     pending: usize,
@@ -114,7 +120,7 @@ struct Header {
     pending_arrivals: usize,
 }
 
-impl Header {
+impl Header<'_> {
     /// SHA-256 of the header without its checksum, and of the words.
     fn checksum_with(&self, words: &[u8]) -> serde_json::Result<String> {
         let bare = serde_json::to_vec(&Self { checksum: String::new(), ..self.clone() })?;
@@ -161,14 +167,7 @@ impl GuideState {
             format: FORMAT.to_owned(),
             version: VERSION,
             checksum: String::new(),
-            origin: self.origin.clone(),
-            samples: self.samples,
-            rebuilt_at: self.rebuilt_at,
-            is_open: self.is_open,
-            arm: self.arm,
-            arm_since: self.arm_since,
-            races: self.races,
-            tag: self.tag,
+            state: Cow::Borrowed(self),
             cells: self.keys.len(),
             refined: self.refined.len(),
             pending: self.pending.len(),
@@ -194,7 +193,7 @@ impl GuideState {
         };
         let damaged = |what: &str| Error::format(path, format!("damaged guide: {what}"));
         let split = bytes.iter().position(|byte| *byte == b'\n').ok_or_else(no_guide)?;
-        let header: Header = serde_json::from_slice(&bytes[..split]).map_err(|_| no_guide())?;
+        let header: Header<'_> = serde_json::from_slice(&bytes[..split]).map_err(|_| no_guide())?;
         if header.format != FORMAT {
             return Err(no_guide());
         }
@@ -211,10 +210,10 @@ impl GuideState {
         if header.checksum_with(words).ok().as_ref() != Some(&header.checksum) {
             return Err(damaged("its checksum does not match its content"));
         }
-        if header.arm.is_some_and(|arm| !arm.is_possible()) {
+        if header.state.arm.is_some_and(|arm| !arm.is_possible()) {
             return Err(damaged("its header holds an impossible arm"));
         }
-        let regions = header.origin.regions as usize;
+        let regions = header.state.origin.regions as usize;
         // Sums of so wide numbers do not overflow.
         let words_of = |count: usize, words: usize| count as u128 * words as u128;
         let length = words_of(header.cells, regions) * COUNT_WORDS as u128
@@ -236,36 +235,19 @@ impl GuideState {
         if header.arrivals.max(header.pending_arrivals) > header.cells * ARRIVAL_DIRECTIONS {
             return Err(damaged("its bounces belong to more cells than it has"));
         }
-        let mut words = words.into_iter();
-        let mut take = |count: usize| words.by_ref().take(count).collect::<Vec<u32>>();
-        let counted = |words: Vec<u32>| -> Vec<CountWords> {
-            words.chunks_exact(COUNT_WORDS).map(|count| [count[0], count[1], count[2]]).collect()
-        };
-        let pairs = |words: Vec<u32>| -> Vec<ArrivalWords> {
-            words.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
-        };
+        let mut rest = &words[..];
         let state = Self {
-            origin: header.origin,
-            samples: header.samples,
-            rebuilt_at: header.rebuilt_at,
-            is_open: header.is_open,
-            arm: header.arm,
-            arm_since: header.arm_since,
-            races: header.races,
-            tag: header.tag,
-            rectangles: take(5 * regions)
-                .chunks_exact(5)
-                .map(|words| [words[0], words[1], words[2], words[3], words[4]])
-                .collect(),
-            keys: take(header.cells),
-            refined: take(header.refined),
-            counts: counted(take(COUNT_WORDS * counts)),
-            shares: take(shares),
-            pending: counted(take(COUNT_WORDS * header.pending)),
-            pending_shares: take(header.pending_shares),
-            missing: take(header.missing),
-            arrivals: pairs(take(2 * header.arrivals)),
-            pending_arrivals: pairs(take(2 * header.pending_arrivals)),
+            rectangles: take(&mut rest, regions),
+            keys: take(&mut rest, header.cells),
+            refined: take(&mut rest, header.refined),
+            counts: take(&mut rest, counts),
+            shares: take(&mut rest, shares),
+            pending: take(&mut rest, header.pending),
+            pending_shares: take(&mut rest, header.pending_shares),
+            missing: take(&mut rest, header.missing),
+            arrivals: take(&mut rest, header.arrivals),
+            pending_arrivals: take(&mut rest, header.pending_arrivals),
+            ..header.state.into_owned()
         };
         let is_possible = |[rays, light]: &ArrivalWords| {
             (0.0..=MAX_ARRIVAL_RAYS).contains(&f32::from_bits(*rays))
@@ -276,6 +258,13 @@ impl GuideState {
         }
         Ok(state)
     }
+}
+
+/// Takes the next array of `count` elements off the words.
+fn take<T: Pod>(words: &mut &[u32], count: usize) -> Vec<T> {
+    let (own, rest) = words.split_at(count * size_of::<T>() / 4);
+    *words = rest;
+    bytemuck::cast_slice(own).to_vec()
 }
 
 #[cfg(test)]
@@ -356,9 +345,9 @@ mod tests {
             assert!(message(&other).contains("its checksum does not match"), "{number}");
         }
         // Forged numbers with a checksum of their own
-        let forged = |change: &dyn Fn(&mut Header)| {
+        let forged = |change: &dyn Fn(&mut Header<'_>)| {
             let split = good.iter().position(|byte| *byte == b'\n').unwrap();
-            let mut header: Header = serde_json::from_slice(&good[..split]).unwrap();
+            let mut header: Header<'_> = serde_json::from_slice(&good[..split]).unwrap();
             change(&mut header);
             header.checksum = header.checksum_with(&good[split + 1..]).unwrap();
             let mut bytes = serde_json::to_vec(&header).unwrap();
@@ -373,7 +362,7 @@ mod tests {
             Arm { guides_bounces: true, guides_later: false, ..arm() },
             Arm { roulette_throughput: -1.0, ..arm() },
         ] {
-            let message = forged(&|header| header.arm = Some(wrong));
+            let message = forged(&|header| header.state.to_mut().arm = Some(wrong));
             assert!(message.contains("impossible arm"), "{message}");
         }
         // Sums that would overflow to infinities, and these to densities that are no numbers
