@@ -16,7 +16,7 @@ UPDATES(paths)
 
 void gather_path(uint path) {
     uint path_count = wave_path_count();
-    if (load_hit_origin(path).material == NO_MATERIAL) {
+    if (load_hit(path).material == NO_MATERIAL) {
         Ray ray = load_ray(path);
         bool is_first = wave.first_shadow_ray == 0u && wave.to_lamps == 0u;
         uint rays = wave.arriving_shadow_rays;

@@ -22,7 +22,7 @@ layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffff
 // Starts a ray, or finishes one without a contribution. Returns true if it is traced.
 bool start_ray(uint place, uint path_count, float offset) {
     ListedRay listed = listed_ray(place, path_count);
-    HitOrigin hit = load_hit_origin(listed.path);
+    Hit hit = load_hit(listed.path);
     ShadowRay ray = load_shadow_ray(listed.ray);
     bool is_traced = hit.material != NO_MATERIAL && ray.contribution != vec3(0.0);
     vec3 origin = moved_off_surface(hit.position, hit.geometric_normal, ray.direction, offset);

@@ -11,7 +11,7 @@ READS(visibility)
 UPDATES(record_counts)
 
 void record_ray(ListedRay listed) {
-    HitOrigin hit = load_hit_origin(listed.path);
+    Hit hit = load_hit(listed.path);
     ShadowRay ray = load_shadow_ray(listed.ray);
     // Same test as in shadow.comp: rays without a contribution are not traced.
     if (hit.material == NO_MATERIAL || ray.contribution == vec3(0.0)) {

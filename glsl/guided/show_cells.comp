@@ -20,7 +20,7 @@ void show_pixel(uint pixel, PathIndex index) {
     vec3 colour = film_guide_cell[place];
     vec3 level = film_guide_level[place];
     for (uint i = 0u; i < wave.sample_count; ++i) {
-        HitOrigin hit = load_hit_origin(i * wave.pixel_count + pixel);
+        Hit hit = load_hit(i * wave.pixel_count + pixel);
         if (hit.material == NO_MATERIAL) {
             continue;
         }

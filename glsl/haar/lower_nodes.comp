@@ -45,7 +45,7 @@ float next_factor(uint path, uint path_count, uint recorded, vec3 centre) {
 
 void lower_path(uint path) {
     uint path_count = wave_path_count();
-    if (load_hit_origin(path).material == NO_MATERIAL) {
+    if (load_hit(path).material == NO_MATERIAL) {
         return;
     }
     // Rays without a contribution were not traced.

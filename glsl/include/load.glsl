@@ -16,19 +16,6 @@ Ray load_ray(uint index) {
         uintBitsToFloat(second.w));
 }
 
-// Part of a hit that a ray leaving it needs.
-struct HitOrigin {
-    vec3 position;
-    uint material;
-    vec3 geometric_normal;
-};
-
-HitOrigin load_hit_origin(uint index) {
-    uvec4 first = texelFetch(hit_texels, int(3u * index));
-    uvec4 second = texelFetch(hit_texels, int(3u * index + 1u));
-    return HitOrigin(uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz));
-}
-
 Hit load_hit(uint index) {
     uvec4 first = texelFetch(hit_texels, int(3u * index));
     uvec4 second = texelFetch(hit_texels, int(3u * index + 1u));

@@ -11,7 +11,7 @@ UPDATES(seen)
 
 void admit_path(uint path) {
     uint path_count = wave_path_count();
-    if (load_hit_origin(path).material == NO_MATERIAL) {
+    if (load_hit(path).material == NO_MATERIAL) {
         return;
     }
     uint traced = 0u;

@@ -11,7 +11,7 @@ READS(visibility)
 UPDATES(tile_counts)
 
 void count_ray(ListedRay listed) {
-    HitOrigin hit = load_hit_origin(listed.path);
+    Hit hit = load_hit(listed.path);
     if (hit.material == NO_MATERIAL) {
         return;
     }

@@ -13,7 +13,7 @@ void count_pixel(uint pixel, PathIndex index) {
     uvec2 entries_and_hits = film_cache_entries[place];
     for (uint i = 0u; i < wave.sample_count; ++i) {
         uint path = i * wave.pixel_count + pixel;
-        if (load_hit_origin(path).material == NO_MATERIAL) {
+        if (load_hit(path).material == NO_MATERIAL) {
             continue;
         }
         uint recorded = visibility_cache[cache_head(path, index.film_index)] & ~CACHE_GROWN;
