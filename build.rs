@@ -24,6 +24,7 @@ use std::{
 use shader::{
     bindings::{Binding, Kind},
     constants, rooms,
+    structs::SharedStruct,
 };
 
 /// Folder of the common passes; one folder in it for the passes of each technique.
@@ -64,7 +65,35 @@ fn entry_points(folder: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(entries(folder)?.into_iter().filter(is_entry_point).collect())
 }
 
-/// GLSL of every struct, and a macro for every buffer.
+/// A macro that defines `load(index)`, which puts a struct together from its texels: of four words each, or of
+/// two where it does not fill those.
+fn loader(shared: &SharedStruct) -> String {
+    let words = shared.size / 4;
+    let width = if words.is_multiple_of(4) { 4 } else { 2 };
+    let texels = words / width;
+    let mut text = format!("#define LOADS_{0}(load, texels) {0} load(uint index) {{", shared.name);
+    for texel in 0..texels {
+        let fetch = format!("texelFetch(texels, int({texels}u * index + {texel}u))");
+        let _ = write!(text, " uvec{width} texel_{texel} = uvec{width}({fetch});");
+    }
+    let member = |kind: &str, first: usize| {
+        let count = kind.chars().last().and_then(|last| last.to_digit(10)).unwrap_or(1) as usize;
+        let part = |word: usize, count: usize| {
+            format!("texel_{}.{}", word / width, &"xyzw"[word % width..][..count])
+        };
+        let bits = if first % width + count <= width {
+            part(first, count)
+        } else {
+            let words: Vec<String> = (first..first + count).map(|word| part(word, 1)).collect();
+            format!("uvec{count}({})", words.join(", "))
+        };
+        if kind.starts_with('u') { bits } else { format!("uintBitsToFloat({bits})") }
+    };
+    let members = shared.members.iter().map(|own| member(own.kind, own.offset / 4));
+    text + &format!(" return {}({}); }}", shared.name, members.collect::<Vec<_>>().join(", "))
+}
+
+/// GLSL of every struct with a macro that loads it, and a macro for every buffer.
 fn interface() -> String {
     let mut text = String::new();
     for shared in rooms::structs() {
@@ -72,7 +101,7 @@ fn interface() -> String {
             let _ = write!(members, "{} {}; ", member.kind, member.name);
             members
         });
-        let _ = writeln!(text, "struct {} {{ {members}}};", shared.name);
+        let _ = writeln!(text, "struct {} {{ {members}}};\n{}", shared.name, loader(shared));
     }
     for binding in rooms::tables().flat_map(|table| table.bindings) {
         let Binding { set, number, kind, .. } = *binding;

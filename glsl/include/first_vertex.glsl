@@ -5,22 +5,7 @@
 #include "load.glsl"
 #include "surfaces.glsl"
 
-TEXELS(first_vertex_texels)
-
-FirstVertex load_first_vertex(uint path) {
-    int texel = int(6u * path);
-    uvec4 first = texelFetch(first_vertex_texels, texel);
-    uvec4 second = texelFetch(first_vertex_texels, texel + 1);
-    uvec4 third = texelFetch(first_vertex_texels, texel + 2);
-    uvec4 fourth = texelFetch(first_vertex_texels, texel + 3);
-    uvec4 fifth = texelFetch(first_vertex_texels, texel + 4);
-    uint last = texelFetch(first_vertex_texels, texel + 5).x;
-    return FirstVertex(
-        uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz), uintBitsToFloat(second.w),
-        uintBitsToFloat(third.xyz), uintBitsToFloat(third.w), uintBitsToFloat(fourth.xyz),
-        uintBitsToFloat(uvec3(fourth.w, fifth.xy)), uintBitsToFloat(uvec3(fifth.zw, last)),
-        vec3(0.0));
-}
+LOADS(FirstVertex, load_first_vertex, first_vertex_texels)
 
 // Material of a first vertex, as textures vary it, seen from where the path came.
 Reflector first_reflector(FirstVertex vertex, Frame frame) {

@@ -13,3 +13,5 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 #define UPDATES(name) BUFFER_##name(READ_WRITE)
 #define READ_WRITE
 #define TEXELS(name) TEXELS_##name
+// Declares texels that hold a struct each, and `load`, which returns that of an index.
+#define LOADS(Struct, load, texels) TEXELS(texels) LOADS_##Struct(load, texels)

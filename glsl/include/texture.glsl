@@ -12,8 +12,6 @@ TEXELS(texture_words_0)
 TEXELS(texture_words_1)
 TEXELS(texture_words_2)
 TEXELS(texture_words_3)
-TEXELS(texture_use_texels)
-TEXELS(material_surface_texels)
 TEXELS(triangle_attributes_0)
 TEXELS(triangle_attributes_1)
 TEXELS(triangle_attributes_2)
@@ -25,27 +23,8 @@ layout(constant_id = CONSTANT_ATTRIBUTE_PAGES) const uint ATTRIBUTE_PAGES = 1u;
 layout(constant_id = CONSTANT_ATTRIBUTE_PAGE_SHIFT) const uint ATTRIBUTE_PAGE_SHIFT = 27u;
 layout(constant_id = CONSTANT_ATTRIBUTES) const uint ATTRIBUTES = 0u;
 
-TextureUse load_texture_use(uint index) {
-    uvec4 first = texelFetch(texture_use_texels, int(4u * index));
-    uvec4 second = texelFetch(texture_use_texels, int(4u * index + 1u));
-    uvec4 third = texelFetch(texture_use_texels, int(4u * index + 2u));
-    uvec4 fourth = texelFetch(texture_use_texels, int(4u * index + 3u));
-    return TextureUse(
-        first.x, first.y, first.z, first.w, uintBitsToFloat(second.xyz),
-        uintBitsToFloat(uvec3(second.w, third.xy)), uintBitsToFloat(uvec3(third.zw, fourth.x)),
-        uintBitsToFloat(fourth.yzw));
-}
-
-MaterialSurface load_material_surface(uint material) {
-    uvec4 first = texelFetch(material_surface_texels, int(4u * material));
-    uvec4 second = texelFetch(material_surface_texels, int(4u * material + 1u));
-    uvec4 third = texelFetch(material_surface_texels, int(4u * material + 2u));
-    uvec3 fourth = texelFetch(material_surface_texels, int(4u * material + 3u)).xyz;
-    return MaterialSurface(
-        first.x, first.y, first.z, first.w, second.x, second.y, uintBitsToFloat(second.z),
-        uintBitsToFloat(second.w), uintBitsToFloat(third.x), uintBitsToFloat(third.yzw), fourth.x,
-        uintBitsToFloat(fourth.y), fourth.z, 0.0);
-}
+LOADS(TextureUse, load_texture_use, texture_use_texels)
+LOADS(MaterialSurface, load_material_surface, material_surface_texels)
 
 // Defines a function that reads a word of a buffer in up to four pages; with one page the choice folds away.
 #define PAGED_WORDS(read, words, PAGES, PAGE_SHIFT) \

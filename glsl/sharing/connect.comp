@@ -13,7 +13,7 @@
 #include "sharing/shared_part.glsl"
 #include "wave.glsl"
 
-TEXELS(offer_texels)
+LOADS(Offer, load_offer, offer_texels)
 WRITES(hits)
 WRITES(shadow_rays)
 WRITES(connections)
@@ -22,33 +22,20 @@ WRITES(seen)
 // Squared distance below which vertices are not connected, square metres: its inverse is finite.
 const float LEAST_SQUARED_DISTANCE = 1.0e-18;
 
-Offer load_offer(uint path) {
-    int texel = int(6u * path);
-    uvec4 first = texelFetch(offer_texels, texel);
-    uvec4 second = texelFetch(offer_texels, texel + 1);
-    uvec4 third = texelFetch(offer_texels, texel + 2);
-    uvec4 fourth = texelFetch(offer_texels, texel + 3);
-    return Offer(
-        uintBitsToFloat(first.xyz), first.w, uintBitsToFloat(second.xyz), uintBitsToFloat(second.w),
-        uintBitsToFloat(third.xyz), uintBitsToFloat(third.w), uintBitsToFloat(fourth.xyz),
-        uintBitsToFloat(fourth.w), vec3(0.0), 0.0, vec3(0.0), 0.0);
-}
-
 // Radiance that the shared part of an offered vertex sends into a direction.
 vec3 offered_radiance(uint path, Offer offer, vec3 outgoing) {
     Material material = load_material(offer.material);
     if (is_kind(material, MATERIAL_DIFFUSE)) {
         return offer.radiance;
     }
-    int texel = int(6u * path);
+    // The rest of the offer is fetched only here.
+    Offer rest = load_offer(path);
     if (IS_TEXTURED) {
-        vec3 reflectance = uintBitsToFloat(texelFetch(offer_texels, texel + 5).xyz);
-        material = varied(material, Surface(reflectance, offer.alpha, offer.metallic));
+        material = varied(material, Surface(rest.reflectance, offer.alpha, offer.metallic));
     }
-    vec3 incident = uintBitsToFloat(texelFetch(offer_texels, texel + 4).xyz);
     Frame frame = frame_from_normal(offer.shading_normal);
     Reflector reflector = reflector_from(material, to_local(frame, outgoing));
-    vec3 value = brdf_evaluate(reflector, to_local(frame, incident));
+    vec3 value = brdf_evaluate(reflector, to_local(frame, rest.incident));
     return offer.radiance * shared_share(value) * value;
 }
 
