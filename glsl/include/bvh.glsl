@@ -21,14 +21,11 @@
 #include "surfaces.glsl"
 
 TEXELS(bvh_nodes)
-TEXELS(triangles_0)
-TEXELS(triangles_1)
-TEXELS(triangles_2)
-TEXELS(triangles_3)
 
-// A page holds 1 << TRIANGLE_PAGE_SHIFT triangles; with one page the choice folds away.
 layout(constant_id = CONSTANT_TRIANGLE_PAGES) const uint TRIANGLE_PAGES = 1u;
 layout(constant_id = CONSTANT_TRIANGLE_PAGE_SHIFT) const uint TRIANGLE_PAGE_SHIFT = 30u;
+// Texel `part` (0 to 2) of a triangle: position and packed normal of a vertex.
+PAGED_TEXELS(triangle_texel, triangles, 3u, TRIANGLE_PAGES, TRIANGLE_PAGE_SHIFT)
 
 const float FAR_AWAY = 3.0e38;
 
@@ -145,25 +142,6 @@ void bvh_start(vec3 origin, vec3 direction, float farthest, bool any_hit) {
     bvh_passed_distance = 0.0;
     bvh_transmittance = vec3(1.0);
     bvh_restart(farthest, any_hit);
-}
-
-// Texel `corner` (0 to 2) of a triangle: position and packed normal of a vertex.
-uvec4 triangle_texel(uint triangle, uint corner) {
-    if (TRIANGLE_PAGES == 1u) {
-        return texelFetch(triangles_0, int(3u * triangle + corner));
-    }
-    uint page = triangle >> TRIANGLE_PAGE_SHIFT;
-    int texel = int(3u * (triangle - (page << TRIANGLE_PAGE_SHIFT)) + corner);
-    if (page == 0u) {
-        return texelFetch(triangles_0, texel);
-    }
-    if (page == 1u) {
-        return texelFetch(triangles_1, texel);
-    }
-    if (page == 2u) {
-        return texelFetch(triangles_2, texel);
-    }
-    return texelFetch(triangles_3, texel);
 }
 
 // Corner (0 to 2) of a triangle in the world.

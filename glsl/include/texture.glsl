@@ -8,15 +8,6 @@
 #include "bvh.glsl"
 #include "layout.glsl"
 
-TEXELS(texture_words_0)
-TEXELS(texture_words_1)
-TEXELS(texture_words_2)
-TEXELS(texture_words_3)
-TEXELS(triangle_attributes_0)
-TEXELS(triangle_attributes_1)
-TEXELS(triangle_attributes_2)
-TEXELS(triangle_attributes_3)
-
 layout(constant_id = CONSTANT_TEXTURE_PAGES) const uint TEXTURE_PAGES = 1u;
 layout(constant_id = CONSTANT_TEXTURE_PAGE_SHIFT) const uint TEXTURE_PAGE_SHIFT = 27u;
 layout(constant_id = CONSTANT_ATTRIBUTE_PAGES) const uint ATTRIBUTE_PAGES = 1u;
@@ -26,28 +17,8 @@ layout(constant_id = CONSTANT_ATTRIBUTES) const uint ATTRIBUTES = 0u;
 LOADS(TextureUse, load_texture_use, texture_use_texels)
 LOADS(MaterialSurface, load_material_surface, material_surface_texels)
 
-// Defines a function that reads a word of a buffer in up to four pages; with one page the choice folds away.
-#define PAGED_WORDS(read, words, PAGES, PAGE_SHIFT) \
-    uint read(uint index) { \
-        if (PAGES == 1u) { \
-            return texelFetch(words##_0, int(index)).x; \
-        } \
-        uint page = index >> PAGE_SHIFT; \
-        int word = int(index - (page << PAGE_SHIFT)); \
-        if (page == 0u) { \
-            return texelFetch(words##_0, word).x; \
-        } \
-        if (page == 1u) { \
-            return texelFetch(words##_1, word).x; \
-        } \
-        if (page == 2u) { \
-            return texelFetch(words##_2, word).x; \
-        } \
-        return texelFetch(words##_3, word).x; \
-    }
-
-PAGED_WORDS(texture_word, texture_words, TEXTURE_PAGES, TEXTURE_PAGE_SHIFT)
-PAGED_WORDS(attribute_word, triangle_attributes, ATTRIBUTE_PAGES, ATTRIBUTE_PAGE_SHIFT)
+PAGED_TEXELS(texture_word, texture_words, 1u, TEXTURE_PAGES, TEXTURE_PAGE_SHIFT)
+PAGED_TEXELS(attribute_word, triangle_attributes, 1u, ATTRIBUTE_PAGES, ATTRIBUTE_PAGE_SHIFT)
 
 // Linear value of a number 0 to 1 in the encoding of [IEC 61966-2-1:1999].
 float srgb_to_linear(float encoded) {
@@ -60,10 +31,10 @@ vec4 texture_texel(TextureUse used, ivec2 place) {
     uint format = used.flags & TEXTURE_FORMAT_MASK;
     vec4 texel;
     if (format == TEXTURE_BYTES) {
-        texel = unpackUnorm4x8(texture_word(used.first_word + index));
+        texel = unpackUnorm4x8(texture_word(used.first_word + index, 0u).x);
     } else {
-        uint low = texture_word(used.first_word + 2u * index);
-        uint high = texture_word(used.first_word + 2u * index + 1u);
+        uint low = texture_word(used.first_word + 2u * index, 0u).x;
+        uint high = texture_word(used.first_word + 2u * index + 1u, 0u).x;
         texel = format == TEXTURE_SHORTS ? vec4(unpackUnorm2x16(low), unpackUnorm2x16(high))
                                          : vec4(unpackHalf2x16(low), unpackHalf2x16(high));
     }
@@ -168,7 +139,7 @@ uvec2 corner_attribute(uint triangle, uint corner, uint bit) {
     uint place = 2u * uint(bitCount(ATTRIBUTES & (bit - 1u)));
     uint stride = 2u * uint(bitCount(ATTRIBUTES));
     uint word = (3u * triangle + corner) * stride + place;
-    return uvec2(attribute_word(word), attribute_word(word + 1u));
+    return uvec2(attribute_word(word, 0u).x, attribute_word(word + 1u, 0u).x);
 }
 
 // Texture coordinates at a corner; 0 where there are none.
