@@ -128,7 +128,7 @@ impl Paths {
         let size = NodeSize::new(&parameters, SHADOW_RAYS);
         let waves =
             WaveBuffers::new(device, 64, 1 << 17, 1, size.demand(), Surfaces::default()).unwrap();
-        let steps = HaarSteps::new(&parameters, tree.depth(), buffers.surfaces(), SHADOW_RAYS);
+        let steps = HaarSteps::new(&parameters, tree.depth, buffers.surfaces(), SHADOW_RAYS);
         let nodes = NodeBuffers::new(device, &tree, size, waves.capacity()).unwrap();
         let wave = Wave {
             pixel_count: surfaces.len() as u32,
@@ -154,7 +154,7 @@ impl Paths {
         for kernel in kernels {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
-            let sets = [self.scene.set(), self.nodes.set(), self.waves.set()];
+            let sets = [self.scene.set(), &self.nodes.set, self.waves.set()];
             pass.record(&mut commands, &sets, &self.wave, None);
             commands.submit_and_wait().unwrap();
         }
@@ -172,7 +172,7 @@ impl Paths {
     /// Returns the nodes of a path in Morton order.
     fn nodes_of(&self, path: usize) -> Vec<f32> {
         let (count, stride) = (1_usize << (2 * self.level()), self.surfaces.len());
-        let halves: Vec<u16> = self.nodes.nodes().download(count * stride).unwrap();
+        let halves: Vec<u16> = self.nodes.nodes.download(count * stride).unwrap();
         let node = |node: usize| halves[4 * (node / 4 * stride + path) + node % 4];
         (0..count).map(|index| f16::from_bits(node(index)).to_f32()).collect()
     }
@@ -183,9 +183,9 @@ impl Paths {
             (CONSTANT_BRDF_SHARE, shares.brdf_share.to_bits()),
             (CONSTANT_ENVIRONMENT_SHARE, shares.environment_share.to_bits()),
             (CONSTANT_HAAR_LEVEL, self.level()),
-            (CONSTANT_HAAR_DEPTH, self.tree.depth()),
+            (CONSTANT_HAAR_DEPTH, self.tree.depth),
         ];
-        let sets = [self.scene.set(), self.nodes.set(), self.waves.set()];
+        let sets = [self.scene.set(), &self.nodes.set, self.waves.set()];
         let push = bytemuck::bytes_of(&self.wave);
         support::run_probe_with("haar", &constants, &sets, push, queries)
     }

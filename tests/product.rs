@@ -194,7 +194,7 @@ impl Paths {
         let traversal =
             Traversal { page_count: 1, page_shift: 20, is_instanced: false, is_on_host: false };
         let steps =
-            VisibilitySteps::new(visibility, product, fits.sizes(), kinds, traversal, SHADOW_RAYS);
+            VisibilitySteps::new(visibility, product, fits.sizes, kinds, traversal, SHADOW_RAYS);
         let lobes = LobeBuffers::new(device, fits, size, waves.capacity()).unwrap();
         let wave = Wave {
             pixel_count: surfaces.len() as u32,
@@ -217,7 +217,7 @@ impl Paths {
     fn run(&self, kernels: Vec<Kernel>) {
         let device = support::device();
         let film = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &self.counters)]).unwrap();
-        let sets = [self.scene.set(), self.lobes.set(), self.waves.set(), &film];
+        let sets = [self.scene.set(), &self.lobes.set, self.waves.set(), &film];
         for kernel in kernels {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
@@ -247,7 +247,7 @@ impl Paths {
     }
 
     fn probe<Q: Pod, A: Pod>(&self, kernel: &str, with_scene: bool, queries: &[Q]) -> Vec<A> {
-        let mut sets = vec![self.waves.set(), self.lobes.set()];
+        let mut sets = vec![self.waves.set(), &self.lobes.set];
         if with_scene {
             sets.push(self.scene.set());
         }

@@ -48,19 +48,19 @@ pub fn warp(weights: [f32; 4], u: &mut Vec2) -> u32 {
 
 /// Means of the children of a node.
 fn children(tree: &Tree, level: u32, node: u32) -> [f32; 4] {
-    tree.nodes()[first_of_level(level) + node as usize]
+    tree.nodes[first_of_level(level) + node as usize]
 }
 
 /// Number of the texel in a direction.
 fn texel_of(tree: &Tree, direction: Vec3) -> u32 {
-    let side = (1_u32 << tree.depth()) as f32;
+    let side = (1_u32 << tree.depth) as f32;
     let place = (square_from_direction(direction) * side).min(Vec2::splat(side - 1.0));
     spread_bits(place.x as u32) | spread_bits(place.y as u32) << 1
 }
 
 /// Luminance of a texel.
 fn texel(tree: &Tree, texel: u32) -> f32 {
-    children(tree, tree.depth() - 1, texel >> 2)[(texel & 3) as usize]
+    children(tree, tree.depth - 1, texel >> 2)[(texel & 3) as usize]
 }
 
 /// Nodes hold multiples of this unit.
@@ -145,7 +145,7 @@ impl<'a> Product<'a> {
     /// Density of a direction per steradian, for a total above 0.
     pub fn pdf(&self, direction: Vec3) -> f32 {
         let at = texel_of(self.tree, direction);
-        self.density(at >> (2 * (self.tree.depth() - self.level)), texel(self.tree, at))
+        self.density(at >> (2 * (self.tree.depth - self.level)), texel(self.tree, at))
     }
 
     /// Samples a direction and its density by hierarchical warping, for a total above 0; `u` in \[0, 1)².
@@ -156,13 +156,13 @@ impl<'a> Product<'a> {
             node = 4 * node + warp(sums, &mut u);
         }
         let (product_node, mut light) = (node, 0.0);
-        for level in self.level..self.tree.depth() {
+        for level in self.level..self.tree.depth {
             let children = children(self.tree, level, node);
             let child = warp(children, &mut u);
             light = children[child as usize];
             node = 4 * node + child;
         }
-        let at = place_in_square(self.tree.depth(), node, u);
+        let at = place_in_square(self.tree.depth, node, u);
         (direction_from_square(at), self.density(product_node, light))
     }
 }
@@ -172,7 +172,7 @@ fn means_are_those_of_the_map() {
     let parameters = CourtParameters { width: 128, ..CourtParameters::default() };
     let map = EnvironmentMap::court(&parameters, 1.0, 30.0).unwrap();
     let tree = Tree::new(&map);
-    assert_eq!((tree.depth(), tree.nodes().len()), (7, first_of_level(7)));
+    assert_eq!((tree.depth, tree.nodes.len()), (7, first_of_level(7)));
     let total = EnvironmentTables::new(&map).total;
     // The tables sum over u and v, whose Jacobian is 2π² sin θ.
     let expected = f64::from(total) * f64::from(PI) / 2.0;

@@ -53,8 +53,10 @@ impl NodeSize {
 
 /// Descriptor set 1 of `haar`.
 pub struct NodeBuffers {
-    pub(super) set: DescriptorSet,
-    nodes: Buffer,
+    /// Descriptor set 1.
+    pub set: DescriptorSet,
+    /// Halves of the nodes, two words for each four.
+    pub nodes: Buffer,
 }
 
 impl NodeBuffers {
@@ -65,7 +67,7 @@ impl NodeBuffers {
         let centres: Vec<[f32; 4]> = (0..1 << (2 * size.level))
             .map(|node| node_centre(size.level, node).extend(0.0).to_array())
             .collect();
-        let tree = Buffer::texels_from_slice(device, "environment tree", tree.nodes())?;
+        let tree = Buffer::texels_from_slice(device, "environment tree", &tree.nodes)?;
         let centres = Buffer::texels_from_slice(device, "node centres", &centres)?;
         let nodes = Buffer::new(device, "product nodes", paths * size.quads() * 8)?;
         let sums = Buffer::new(device, "node sums", paths * size.sums() * 16)?;
@@ -81,15 +83,5 @@ impl NodeBuffers {
         ];
         let set = DescriptorSet::new(device, &haar::TABLE, &bound)?;
         Ok(Self { set, nodes })
-    }
-
-    /// Descriptor set 1.
-    pub fn set(&self) -> &DescriptorSet {
-        &self.set
-    }
-
-    /// Halves of the nodes, two words for each four.
-    pub fn nodes(&self) -> &Buffer {
-        &self.nodes
     }
 }

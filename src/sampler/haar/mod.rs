@@ -51,7 +51,7 @@ impl Room for HaarRoom {
         let tree = Tree::new(&scene.environment);
         let tree_ms = start.elapsed().as_secs_f64() * 1e3;
         let (surfaces, shadow_rays) = (settings.surfaces, settings.shadow_rays);
-        let steps = HaarSteps::new(parameters, tree.depth(), surfaces, shadow_rays);
+        let steps = HaarSteps::new(parameters, tree.depth, surfaces, shadow_rays);
         let size = NodeSize::new(parameters, shadow_rays);
         let nodes = NodeBuffers::new(runner.device(), &tree, size, runner.waves().capacity())?;
         let host_ms = [("environment tree".to_owned(), tree_ms)].into();

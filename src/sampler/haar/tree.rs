@@ -43,8 +43,10 @@ pub fn node_centre(level: u32, node: u32) -> Vec3 {
 /// Means of the environment's luminance.
 #[derive(Clone, Debug)]
 pub struct Tree {
-    depth: u32,
-    nodes: Vec<[f32; 4]>,
+    /// Level of the texels.
+    pub depth: u32,
+    /// Means of the children of every node, level by level.
+    pub nodes: Vec<[f32; 4]>,
 }
 
 impl Tree {
@@ -71,16 +73,6 @@ impl Tree {
             }
         }
         Self { depth, nodes }
-    }
-
-    /// Level of the texels.
-    pub fn depth(&self) -> u32 {
-        self.depth
-    }
-
-    /// Means of the children of every node, level by level.
-    pub fn nodes(&self) -> &[[f32; 4]] {
-        &self.nodes
     }
 }
 

@@ -32,7 +32,8 @@ pub struct FitSizes {
 /// SRBF tables of a scene.
 pub struct Fits {
     buffers: [Buffer; 3],
-    sizes: FitSizes,
+    /// Numbers of lobes and views.
+    pub sizes: FitSizes,
     /// Hash of each fit, by the name of its input.
     pub(super) hashes: BTreeMap<String, String>,
     /// Milliseconds spent on all fits, or on finding them in the cache.
@@ -133,11 +134,6 @@ impl Fits {
             .into_iter()
             .zip(&self.buffers)
             .collect()
-    }
-
-    /// Numbers of lobes and views.
-    pub fn sizes(&self) -> FitSizes {
-        self.sizes
     }
 }
 

@@ -39,9 +39,16 @@ impl LobeSize {
 
 /// Descriptor set 1 of `product` and `visibility`.
 pub struct LobeBuffers {
-    set: DescriptorSet,
-    /// Lobes, their number, sums of weights, close lobes, visibility caches.
-    buffers: [Buffer; 5],
+    /// Descriptor set 1.
+    pub set: DescriptorSet,
+    /// Two words per lobe and path (`lobes.glsl`).
+    pub lobes: Buffer,
+    /// Number of lobes of each path.
+    pub counts: Buffer,
+    /// Masks of the lobes close to cached directions (`cache.glsl`).
+    pub close_lobes: Buffer,
+    /// Visibility caches: a head and its directions each.
+    pub caches: Buffer,
     /// The fits.
     pub(super) fits: Fits,
 }
@@ -50,56 +57,28 @@ impl LobeBuffers {
     /// Allocates the lobes of `paths` paths. Fails if the device does or its limits are exceeded.
     pub fn new(device: &Arc<Device>, fits: Fits, size: LobeSize, paths: u32) -> Result<Self> {
         let paths = u64::from(paths);
-        let lobes = u64::from(size.kept_lobes);
+        let kept = u64::from(size.kept_lobes);
         let make = |name, count: u64, bytes: u64| Buffer::new(device, name, count * bytes);
         let caches = size.cached_pixels.unwrap_or(paths);
         let cache_words =
             if size.cache_capacity > 0 { 1 + u64::from(size.cache_capacity) } else { 0 };
-        let buffers = [
-            make("product lobes", paths * lobes, 8)?,
-            make("lobe counts", paths, 4)?,
-            make("lobe sums", paths * lobes.div_ceil(u64::from(LOBES_PER_SUM)), 4)?,
-            make("close lobes", paths * size.mask_words(), 4)?,
-            Buffer::zeroed(device, "visibility caches", 4 * caches * cache_words)?,
-        ];
-        let [lobes, counts, sums, close, caches] = &buffers;
+        let lobes = make("product lobes", paths * kept, 8)?;
+        let counts = make("lobe counts", paths, 4)?;
+        let sums = make("lobe sums", paths * kept.div_ceil(u64::from(LOBES_PER_SUM)), 4)?;
+        let close_lobes = make("close lobes", paths * size.mask_words(), 4)?;
+        let caches = Buffer::zeroed(device, "visibility caches", 4 * caches * cache_words)?;
         let mut bound = fits.bindings();
         bound.extend([
-            (product::LOBES, lobes),
-            (product::LOBE_TEXELS, lobes),
-            (product::LOBE_COUNTS, counts),
-            (product::LOBE_SUMS, sums),
-            (product::LOBE_SUM_TEXELS, sums),
-            (product::CLOSE_LOBES, close),
-            (product::CLOSE_LOBE_TEXELS, close),
-            (product::VISIBILITY_CACHE, caches),
+            (product::LOBES, &lobes),
+            (product::LOBE_TEXELS, &lobes),
+            (product::LOBE_COUNTS, &counts),
+            (product::LOBE_SUMS, &sums),
+            (product::LOBE_SUM_TEXELS, &sums),
+            (product::CLOSE_LOBES, &close_lobes),
+            (product::CLOSE_LOBE_TEXELS, &close_lobes),
+            (product::VISIBILITY_CACHE, &caches),
         ]);
         let set = DescriptorSet::new(device, &product::TABLE, &bound)?;
-        Ok(Self { set, buffers, fits })
-    }
-
-    /// Descriptor set 1.
-    pub fn set(&self) -> &DescriptorSet {
-        &self.set
-    }
-
-    /// Two words per lobe and path (`lobes.glsl`).
-    pub fn lobes(&self) -> &Buffer {
-        &self.buffers[0]
-    }
-
-    /// Number of lobes of each path.
-    pub fn counts(&self) -> &Buffer {
-        &self.buffers[1]
-    }
-
-    /// Masks of the lobes close to cached directions (`cache.glsl`).
-    pub fn close_lobes(&self) -> &Buffer {
-        &self.buffers[3]
-    }
-
-    /// Visibility caches: a head and its directions each.
-    pub fn caches(&self) -> &Buffer {
-        &self.buffers[4]
+        Ok(Self { set, lobes, counts, close_lobes, caches, fits })
     }
 }

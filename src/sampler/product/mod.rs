@@ -53,7 +53,7 @@ impl Room for ProductRoom {
         let Context { scene, parameters, runner } = context;
         let parameters = parameters.product;
         let fits = Fits::new(runner.device(), scene, &parameters)?;
-        let steps = ProductSteps::new(parameters, fits.sizes(), runner.settings().surfaces);
+        let steps = ProductSteps::new(parameters, fits.sizes, runner.settings().surfaces);
         let paths = runner.waves().capacity();
         let lobes = LobeBuffers::new(runner.device(), fits, size(&parameters), paths)?;
         Ok(Box::new(Product { steps, lobes }))
@@ -72,7 +72,7 @@ impl Passes for Product {
     }
 
     fn set(&self) -> Option<&DescriptorSet> {
-        Some(self.lobes.set())
+        Some(&self.lobes.set)
     }
 }
 

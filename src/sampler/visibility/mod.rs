@@ -63,7 +63,7 @@ impl Room for VisibilityRoom {
         let steps = VisibilitySteps::new(
             parameters.visibility,
             parameters.product,
-            fits.sizes(),
+            fits.sizes,
             settings.surfaces,
             settings.traversal,
             settings.shadow_rays,
@@ -105,7 +105,7 @@ impl Passes for Visibility {
     }
 
     fn set(&self) -> Option<&DescriptorSet> {
-        Some(self.lobes.set())
+        Some(&self.lobes.set)
     }
 }
 
@@ -116,7 +116,7 @@ impl Technique for Visibility {
     }
 
     fn restart(&mut self, _runner: &mut Runner) -> Result<()> {
-        if self.keeps_caches() { self.lobes.caches().clear() } else { Ok(()) }
+        if self.keeps_caches() { self.lobes.caches.clear() } else { Ok(()) }
     }
 
     fn check_resume(&self, samples: u32, progress: &Progress) -> Result<()> {
