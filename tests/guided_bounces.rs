@@ -158,7 +158,7 @@ fn bounce(
         seed,
         ..Wave::default()
     };
-    let sets = [buffers.set(), guide.set(), waves.set()];
+    let sets = [buffers.set(), &guide.set, waves.set()];
     let push = bytemuck::bytes_of(&wave);
     let mut commands = Commands::begin(device).unwrap();
     // Find the cell.

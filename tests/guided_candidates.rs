@@ -167,7 +167,7 @@ impl Paths {
             epoch_seed: 0x5eed + candidates,
             ..Wave::default()
         };
-        let sets = [self.scene.set(), self.guide.set(), self.waves.set()];
+        let sets = [self.scene.set(), &self.guide.set, self.waves.set()];
         support::run_probe_with(
             "guided_candidates",
             &constants,

@@ -62,8 +62,10 @@ pub struct GuideSize {
 /// Everything that learns in one render.
 pub struct GuideBuffers {
     device: Arc<Device>,
-    set: DescriptorSet,
-    partition: Partition,
+    /// Descriptor set 1.
+    pub set: DescriptorSet,
+    /// The regions of the environment.
+    pub(super) partition: Partition,
     /// True if the regions differ from those at the start.
     is_split: bool,
     learned: Guide,
@@ -83,7 +85,8 @@ pub struct GuideBuffers {
     targets: Buffer,
     arrivals: Option<ArrivalBuffers>,
     missing_slots: usize,
-    rebuild_ms: f64,
+    /// Host milliseconds spent on rebuilds since the start.
+    pub(super) rebuild_ms: f64,
 }
 
 impl GuideBuffers {
@@ -189,11 +192,6 @@ impl GuideBuffers {
         Ok(buffers)
     }
 
-    /// Descriptor set 1.
-    pub fn set(&self) -> &DescriptorSet {
-        &self.set
-    }
-
     /// Starts from nothing. Fails if the device does.
     pub fn forget(&mut self) -> Result<()> {
         if self.is_split {
@@ -254,16 +252,6 @@ impl GuideBuffers {
         self.upload()?;
         self.rebuild_ms += start.elapsed().as_secs_f64() * 1e3;
         Ok(())
-    }
-
-    /// Host milliseconds spent on rebuilds since the start.
-    pub fn rebuild_ms(&self) -> f64 {
-        self.rebuild_ms
-    }
-
-    /// The regions of the environment.
-    pub fn partition(&self) -> &Partition {
-        &self.partition
     }
 
     /// Reads the targets of the first `count` shadow rays of the last group: region + number of

@@ -88,7 +88,7 @@ impl Passes for Trial<'_> {
     }
 
     fn set(&self) -> Option<&DescriptorSet> {
-        Some(self.buffers.set())
+        Some(&self.buffers.set)
     }
 }
 

@@ -90,7 +90,7 @@ impl Guided {
         } else {
             vec![NOTHING_TO_LEARN; count]
         };
-        let partition = self.buffers.partition();
+        let partition = &self.buffers.partition;
         let region_count = partition.regions.len() as u32;
         let mut rays = Vec::new();
         let mut cell = None;

@@ -299,7 +299,7 @@ impl Passes for Guided {
     }
 
     fn set(&self) -> Option<&DescriptorSet> {
-        Some(self.buffers.set())
+        Some(&self.buffers.set)
     }
 }
 
@@ -399,7 +399,7 @@ impl Technique for Guided {
     fn report(&self) -> Report {
         Report {
             host_ms: [
-                ("guide rebuilds".to_owned(), self.buffers.rebuild_ms()),
+                ("guide rebuilds".to_owned(), self.buffers.rebuild_ms),
                 ("choice of an arm".to_owned(), self.choice.ms),
             ]
             .into(),
