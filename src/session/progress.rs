@@ -68,7 +68,7 @@ impl Session {
             limit: nearest.map(|(limit, ..)| limit),
             seconds_left: nearest.and_then(|(.., left)| left),
             samples,
-            rays_per_second: self.renderer.totals().rays() as f64 / self.own_seconds().max(1e-9),
+            rays_per_second: self.renderer.totals().rays() as f64 / self.own_seconds.max(1e-9),
             relative_error: self.relative_error,
         }
     }

@@ -96,7 +96,7 @@ pub struct Session {
     /// Wall time that earlier runs spent in passes, seconds.
     earlier_seconds: f64,
     /// Wall time that this run has spent in passes, seconds.
-    own_seconds: f64,
+    pub(super) own_seconds: f64,
     /// Rate of the run, for forecasts.
     pub(super) rate: Rate,
     /// Mean relative standard error at the last look; `None` as long as no sample has found light.
@@ -188,11 +188,6 @@ impl Session {
     /// Wall time of the passes, those of earlier runs included, seconds.
     pub fn seconds(&self) -> f64 {
         self.earlier_seconds + self.own_seconds
-    }
-
-    /// Wall time of the passes of this run, seconds.
-    pub fn own_seconds(&self) -> f64 {
-        self.own_seconds
     }
 
     /// Describes the film with its samples and times so far.

@@ -44,8 +44,7 @@ impl Room for ControlVariatesRoom {
 
     fn describe(&self, parameters: &Parameters) -> BTreeMap<String, String> {
         let mut named = parameters.control_variates.describe();
-        let candidates = parameters.candidates.unwrap_or(basic::AUTO_RIS_CANDIDATES);
-        named.insert("candidates".to_owned(), candidates.to_string());
+        named.extend(basic::RIS.describe(parameters));
         named.extend(basic::MIS.describe(parameters));
         named
     }

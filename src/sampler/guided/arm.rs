@@ -277,69 +277,45 @@ impl Arms {
 
     /// Returns the arms that race along `axes`, `arm` first.
     pub(super) fn contenders(&self, axes: Axes, arm: Arm, is_open: bool) -> Vec<Arm> {
-        let mut all = vec![arm];
         let decides = |those: &[Axes]| axes == Axes::Everything || those.contains(&axes);
-        if decides(&[Axes::Technique, Axes::Techniques]) {
-            all.extend(self.other_technique(arm, is_open));
-        }
-        if decides(&[Axes::Paths, Axes::Techniques]) {
-            all.extend(self.other_bounces(arm));
-            all.extend(self.other_later(arm));
-            all.extend(self.other_sharing(arm));
-        }
-        if decides(&[Axes::Rays]) {
-            all.extend(self.other_rays(arm));
-        }
-        if decides(&[]) {
-            all.extend(self.other_roulette(arm));
-            all.extend(self.other_candidates(arm));
-        }
-        all
-    }
-
-    fn other_technique(&self, arm: Arm, is_open: bool) -> Option<Arm> {
+        let by_paths = decides(&[Axes::Paths, Axes::Techniques]);
         let Arm { shares_paths, roulette_throughput, .. } = arm;
-        let other = Arm { shares_paths, roulette_throughput, ..self.first(arm.is_guided) };
-        (self.chooses_technique && !is_open).then_some(other)
-    }
-
-    fn other_bounces(&self, arm: Arm) -> Option<Arm> {
-        let is_free = arm.is_guided && self.chooses_bounces;
-        is_free.then_some(Arm { guides_bounces: !arm.guides_bounces, guides_later: true, ..arm })
-    }
-
-    fn other_later(&self, arm: Arm) -> Option<Arm> {
-        let is_free = arm.is_guided && self.chooses_later;
-        is_free.then_some(Arm { guides_bounces: false, guides_later: !arm.guides_later, ..arm })
-    }
-
-    fn other_sharing(&self, arm: Arm) -> Option<Arm> {
-        self.chooses_sharing.then_some(Arm { shares_paths: !arm.shares_paths, ..arm })
-    }
-
-    fn other_rays(&self, arm: Arm) -> Vec<Arm> {
         let most = self.first(false).rays[0];
-        let half = arm.rays.map(|rays| rays.div_ceil(2));
-        let twice = arm.rays.map(|rays| (2 * rays).min(most));
-        let others =
-            [half, twice].into_iter().filter(|rays| self.chooses_rays && *rays != arm.rays);
-        others.map(|rays| Arm { rays, ..arm }).collect()
-    }
-
-    fn other_candidates(&self, arm: Arm) -> Vec<Arm> {
+        let with_rays = |rays: [u32; 2]| {
+            let is_free = decides(&[Axes::Rays]) && self.chooses_rays && rays != arm.rays;
+            (is_free, Arm { rays, ..arm })
+        };
+        let [low, high] = ROULETTE_THROUGHPUTS;
+        let other_throughput = if roulette_throughput == low { high } else { low };
+        let others = [
+            (
+                decides(&[Axes::Technique, Axes::Techniques]) && self.chooses_technique && !is_open,
+                Arm { shares_paths, roulette_throughput, ..self.first(arm.is_guided) },
+            ),
+            (
+                by_paths && self.chooses_bounces && arm.is_guided,
+                Arm { guides_bounces: !arm.guides_bounces, guides_later: true, ..arm },
+            ),
+            (
+                by_paths && self.chooses_later && arm.is_guided,
+                Arm { guides_bounces: false, guides_later: !arm.guides_later, ..arm },
+            ),
+            (by_paths && self.chooses_sharing, Arm { shares_paths: !shares_paths, ..arm }),
+            with_rays(arm.rays.map(|rays| rays.div_ceil(2))),
+            with_rays(arm.rays.map(|rays| (2 * rays).min(most))),
+            (
+                decides(&[]) && self.chooses_roulette,
+                Arm { roulette_throughput: other_throughput, ..arm },
+            ),
+        ];
+        let others = others.into_iter().filter_map(|(is_free, other)| is_free.then_some(other));
         let place = GUIDED_CANDIDATES.iter().position(|count| *count == arm.candidates);
-        let place = place.filter(|_| self.chooses_technique && arm.is_guided);
+        let place = place.filter(|_| decides(&[]) && self.chooses_technique && arm.is_guided);
         let next_to =
             |(index, _): &(usize, &u32)| place.is_some_and(|place| place.abs_diff(*index) == 1);
-        let others = GUIDED_CANDIDATES.iter().enumerate().filter(next_to);
-        others.map(|(_, count)| Arm { candidates: *count, ..arm }).collect()
-    }
-
-    fn other_roulette(&self, arm: Arm) -> Option<Arm> {
-        let mut others =
-            ROULETTE_THROUGHPUTS.iter().filter(|other| **other != arm.roulette_throughput);
-        let other = others.next().filter(|_| self.chooses_roulette)?;
-        Some(Arm { roulette_throughput: *other, ..arm })
+        let candidates = GUIDED_CANDIDATES.iter().enumerate().filter(next_to);
+        let candidates = candidates.map(|(_, count)| Arm { candidates: *count, ..arm });
+        [arm].into_iter().chain(others).chain(candidates).collect()
     }
 }
 
