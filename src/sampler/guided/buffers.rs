@@ -7,7 +7,7 @@ use super::{
     SHARE_WORDS, Snapshot,
     arrival_buffers::{self, ArrivalBuffers},
     budget::GuideBudget,
-    cell_readback::{CellLevel, CellReadback, RegionReadback},
+    cell_readback::{CellReadback, RegionReadback},
     decode_entry, decode_visibility,
     parameters::GuidedParameters,
 };
@@ -263,12 +263,7 @@ impl GuideBuffers {
 
     /// Returns a cell as passes read it. Fails if the device does, panics if there is no such cell.
     pub fn cell(&self, index: usize) -> Result<CellReadback> {
-        let key = self.learned.keys()[index];
-        let level = match (index < FACE_COUNT, key.is_coarse()) {
-            (true, _) => CellLevel::Face(index),
-            (false, true) => CellLevel::Coarse(key),
-            (false, false) => CellLevel::Fine(key),
-        };
+        let key = Some(self.learned.keys()[index]).filter(|_| index >= FACE_COUNT);
         let count = self.partition.regions.len();
         let known =
             self.snapshot.entries[index * count..][..count].iter().zip(&self.partition.regions);
@@ -279,7 +274,8 @@ impl GuideBuffers {
                 visibility: decode_visibility(*entry),
                 probability: f64::from(decode_entry(*entry).0) * region.share,
             });
-        Ok(CellReadback { level, regions: regions.collect() })
+        let face = key.map_or(index, CellKey::face);
+        Ok(CellReadback { key, face, regions: regions.collect() })
     }
 
     /// Returns what was learned, and the counts since the last rebuild. Fails if the device does.

@@ -2,17 +2,6 @@
 
 use super::key::CellKey;
 
-/// How closely a cell belongs to the place that found it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CellLevel {
-    /// All places whose surface points at this face of the cube.
-    Face(usize),
-    /// Four fine cells along each axis.
-    Coarse(CellKey),
-    /// The place itself.
-    Fine(CellKey),
-}
-
 /// Knowledge of a cell about one region of the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionReadback {
@@ -30,8 +19,10 @@ pub struct RegionReadback {
 /// A cell of learned visibility.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellReadback {
-    /// Level, and the key or face of the cell.
-    pub level: CellLevel,
+    /// Key; `None` for the cell of all places whose surface points at the face.
+    pub key: Option<CellKey>,
+    /// Face of the cube that its surfaces point at.
+    pub face: usize,
     /// Knowledge by region, in the order of [`super::GuideReadback::partition`].
     pub regions: Vec<RegionReadback>,
 }

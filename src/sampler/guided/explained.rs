@@ -4,7 +4,7 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::{
-    cell_readback::{CellLevel, CellReadback},
+    cell_readback::CellReadback,
     readback::{GuideReadback, GuidedRay},
 };
 use crate::{
@@ -78,15 +78,15 @@ fn ray_numbers(ray: &GuidedRay) -> Value {
 }
 
 fn cell_numbers(cell: &CellReadback) -> Value {
-    let (level, key, face) = match cell.level {
-        CellLevel::Face(face) => ("face", None, face),
-        CellLevel::Coarse(key) => ("coarse", Some(key), key.face()),
-        CellLevel::Fine(key) => ("fine", Some(key), key.face()),
+    let level = match cell.key {
+        None => "face",
+        Some(key) if key.is_coarse() => "coarse",
+        Some(_) => "fine",
     };
     json!({
         "level": level,
-        "key": key.map(|key| key.0),
-        "face": FACES.get(face),
+        "key": cell.key.map(|key| key.0),
+        "face": FACES.get(cell.face),
         "trials": cell.regions.iter().map(|region| region.trials).sum::<f64>(),
         "hits": cell.regions.iter().map(|region| region.hits).sum::<f64>(),
     })

@@ -42,7 +42,7 @@ mod technique;
 pub use arm::Arm;
 pub use arriving::{ARRIVAL_DIRECTIONS, ArrivalWords, ArrivingLight, Reflected};
 pub use buffers::{GuideBuffers, GuideSize};
-pub use cell_readback::{CellLevel, CellReadback, RegionReadback};
+pub use cell_readback::{CellReadback, RegionReadback};
 pub use cells::MAX_CELLS;
 pub use counts::{Count, CountWords, PARTS_PER_RAY};
 pub use entries::{decode_entry, decode_visibility};
