@@ -6,6 +6,8 @@
 //! other surfaces. Bounces are resampled by the result, so its errors cost precision only (Vorba et
 //! al. 2014 guide paths by learned light, fitted with mixtures of Gaussians).
 
+use std::ops::AddAssign;
+
 use rayon::prelude::*;
 
 use crate::sampler::{guided::cells::Tree, regions::FACE_COUNT};
@@ -39,12 +41,14 @@ struct Arrivals {
     light: f32,
 }
 
-impl Arrivals {
-    fn add(&mut self, other: Self) {
+impl AddAssign for Arrivals {
+    fn add_assign(&mut self, other: Self) {
         self.rays += other.rays;
         self.light += other.light;
     }
+}
 
+impl Arrivals {
     /// Mean light of a ray, with a prior worth [`PRIOR_RAYS`].
     fn mean(self, prior: f32) -> f32 {
         (self.light + PRIOR_RAYS * prior) / (self.rays + PRIOR_RAYS)
@@ -107,17 +111,10 @@ impl ArrivingLight {
     pub(super) fn estimate(&self, tree: &Tree, of_environment: &[f32]) -> (Vec<f32>, Reflected) {
         let own = |cell: usize| &self.arrivals[cell * ARRIVAL_DIRECTIONS..][..ARRIVAL_DIRECTIONS];
         // Sum over every inner cell and its descendants
-        let sums = tree.up(|cell, sums: &[Vec<Arrivals>]| {
-            let mut sum = own(cell).to_vec();
-            for &child in &tree.children[cell] {
-                let found = if sums[child].is_empty() { own(child) } else { &sums[child] };
-                sum.iter_mut().zip(found).for_each(|(sum, found)| sum.add(*found));
-            }
-            sum
-        });
+        let sums = tree.sums(|cell| own(cell).iter().copied());
         let mut scene = Arrivals::default();
         for sum in sums[..FACE_COUNT].iter().flatten() {
-            scene.add(*sum);
+            scene += *sum;
         }
         let scene = [scene.light / scene.rays.max(1.0); ARRIVAL_DIRECTIONS];
         // Estimate the mean light of inner cells, parents first
@@ -136,7 +133,7 @@ impl ArrivingLight {
             let mut found = Arrivals::default();
             for ((light, sum), prior) in light.iter_mut().zip(sums).zip(prior) {
                 *light = sum.mean(*prior);
-                found.add(Arrivals { rays: sum.rays, light: sum.rays * *light });
+                found += Arrivals { rays: sum.rays, light: sum.rays * *light };
             }
             let arriving = if found.rays > 0.0 { found.light / found.rays } else { scene[0] };
             *reflected += ASSUMED_REFLECTANCE * arriving;

@@ -1,6 +1,6 @@
 //! The cells of the scene: which exist, which are refined, their hierarchy and their hash table.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, ops::AddAssign};
 
 use rayon::prelude::*;
 
@@ -50,6 +50,24 @@ impl Tree {
         value: impl Fn(usize, &[T]) -> T + Sync,
     ) -> Vec<T> {
         self.walk(self.generations.iter().rev(), value)
+    }
+
+    /// Sums what `own` tells of every inner cell and its descendants, part by part; empty for the leaves.
+    pub(super) fn sums<T: Copy + AddAssign + Send + Sync, Own: Iterator<Item = T>>(
+        &self,
+        own: impl Fn(usize) -> Own + Sync,
+    ) -> Vec<Vec<T>> {
+        self.up(|cell, sums: &[Vec<T>]| {
+            let mut sum: Vec<T> = own(cell).collect();
+            for &child in &self.children[cell] {
+                if sums[child].is_empty() {
+                    sum.iter_mut().zip(own(child)).for_each(|(sum, found)| *sum += found);
+                } else {
+                    sum.iter_mut().zip(&sums[child]).for_each(|(sum, found)| *sum += *found);
+                }
+            }
+            sum
+        })
     }
 
     fn walk<'a, T: Clone + Default + Send + Sync>(

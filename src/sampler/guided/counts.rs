@@ -1,5 +1,7 @@
 //! Counts of visible rays: as they lie on the device and in files, in fixed point, and in rays.
 
+use std::ops::AddAssign;
+
 use crate::shader::rooms::guided::GUIDE_COUNT_WORDS;
 
 /// Trials, hits and the sum of the responses of the hits, as they lie on the device and in files.
@@ -68,20 +70,15 @@ impl From<&Count> for Tally {
     }
 }
 
-impl From<&Tally> for Tally {
-    fn from(tally: &Tally) -> Self {
-        *tally
-    }
-}
-
-impl Tally {
-    /// Adds another tally.
-    pub fn add(&mut self, other: Self) {
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
         self.hits += other.hits;
         self.trials += other.trials;
         self.response += other.response;
     }
+}
 
+impl Tally {
     /// Visibility, with a prior worth `weight` rays.
     pub fn visibility(self, prior: f32, weight: f32) -> f32 {
         (self.hits + weight * prior) / (self.trials + weight)

@@ -131,16 +131,15 @@ impl Estimates {
     }
 
     /// Estimates for a fine cell, with its parent cell as prior, scaled by parent region.
-    pub fn of_fine<'a, T>(counted: &'a [T], parent_cell: &Self, tables: &RegionTables) -> Self
-    where
-        Tally: From<&'a T>,
-    {
+    pub fn of_fine(
+        counted: impl Iterator<Item = Tally> + Clone,
+        parent_cell: &Self,
+        tables: &RegionTables,
+    ) -> Self {
         let mut visible = [Ratio::default(); PARENT_COUNT];
         let mut responses = [Ratio::default(); PARENT_COUNT];
-        for ((counted, prior), region) in
-            counted.iter().zip(&parent_cell.regions).zip(&tables.parents)
-        {
-            let tally = Tally::from(counted);
+        let counted = counted.zip(&parent_cell.regions).zip(&tables.parents);
+        for ((tally, prior), region) in counted.clone() {
             let region = usize::from(*region);
             visible[region].add(tally.hits, tally.trials * prior.visibility);
             responses[region].add(tally.response, tally.hits * prior.response);
@@ -155,15 +154,13 @@ impl Estimates {
         for ((scales, visible), response) in scales.iter_mut().zip(&visible).zip(&responses) {
             *scales = [visible.value(1.0, 1.0).min(MAX_RATIO), response.value(scale, weight)];
         }
-        let estimate = |((counted, prior), region): ((&'a T, &Estimate), &u8)| {
+        let estimate = |((tally, prior), region): ((Tally, &Estimate), &u8)| {
             let [visible, response] = scales[usize::from(*region)];
-            let tally = Tally::from(counted);
             Estimate {
                 visibility: tally.visibility((prior.visibility * visible).min(1.0), PRIOR_RAYS),
                 response: tally.mean_response(prior.response * response, PRIOR_HITS),
             }
         };
-        let counted = counted.iter().zip(&parent_cell.regions).zip(&tables.parents);
         Self::new(counted.map(estimate).collect())
     }
 

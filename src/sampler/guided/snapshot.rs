@@ -57,7 +57,8 @@ impl Guide {
                 let leaf;
                 let estimates = if inner[cell].is_empty() {
                     let parent = &inner[tree.parents[cell]];
-                    leaf = Estimates::of_fine(self.counts(cell), parent, &region_tables);
+                    let counts = self.counts(cell).iter().map(Tally::from);
+                    leaf = Estimates::of_fine(counts, parent, &region_tables);
                     &leaf
                 } else {
                     &inner[cell]
@@ -77,10 +78,11 @@ impl Guide {
     /// Estimates for faces, coarse cells and cells with children, parents first; empty for the
     /// leaves.
     fn estimate_inner_cells(&self, tree: &Tree, tables: &RegionTables) -> Vec<Estimates> {
-        let tallies = self.tallies(tree);
+        // Sum the counts of every inner cell and its descendants
+        let tallies = tree.sums(|cell| self.counts(cell).iter().map(Tally::from));
         let mut scene = Tally::default();
         for tally in tallies[..FACE_COUNT].iter().flatten() {
-            scene.add(*tally);
+            scene += *tally;
         }
         tree.down(|cell, inner: &[Estimates]| {
             let tallies = &tallies[cell];
@@ -90,25 +92,8 @@ impl Guide {
             } else if self.keys()[cell].is_coarse() {
                 Estimates::of_coarse(tallies, parent)
             } else {
-                Estimates::of_fine(tallies, parent, tables)
+                Estimates::of_fine(tallies.iter().copied(), parent, tables)
             }
-        })
-    }
-
-    /// Sums the counts of every inner cell and its descendants; empty for the leaves.
-    fn tallies(&self, tree: &Tree) -> Vec<Vec<Tally>> {
-        tree.up(|cell, tallies: &[Vec<Tally>]| {
-            let mut sum: Vec<Tally> = self.counts(cell).iter().map(Tally::from).collect();
-            for &child in &tree.children[cell] {
-                if tallies[child].is_empty() {
-                    let counts = self.counts(child);
-                    sum.iter_mut().zip(counts).for_each(|(sum, count)| sum.add(count.into()));
-                } else {
-                    let tallies = &tallies[child];
-                    sum.iter_mut().zip(tallies).for_each(|(sum, tally)| sum.add(*tally));
-                }
-            }
-            sum
         })
     }
 
