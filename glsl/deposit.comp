@@ -14,31 +14,15 @@ UPDATES(film_normal)
 UPDATES(film_position)
 UPDATES(counters)
 
-// Adds the features of samples. Sample by sample, as below.
-void add_features(uint pixel, uint place) {
-    bool wants_albedo = (wave.aovs & AOV_ALBEDO) != 0u;
-    bool wants_normal = (wave.aovs & AOV_NORMAL) != 0u;
-    bool wants_position = (wave.aovs & AOV_POSITION) != 0u;
-    uint count = wants_albedo || wants_normal || wants_position ? wave.sample_count : 0u;
-    vec3 albedo = wants_albedo ? film_albedo[place] : vec3(0.0);
-    vec3 normal = wants_normal ? film_normal[place] : vec3(0.0);
-    vec3 position = wants_position ? film_position[place] : vec3(0.0);
-    for (uint i = 0u; i < count; ++i) {
-        Feature feature = features[i * wave.pixel_count + pixel];
-        albedo += feature.albedo;
-        normal += feature.normal;
-        position += feature.position;
+// Adds a feature of the samples to its layer. Sample by sample, as below.
+#define ADD_FEATURE(layer, film, feature) \
+    if ((wave.aovs & layer) != 0u) { \
+        vec3 sum = film[place]; \
+        for (uint i = 0u; i < wave.sample_count; ++i) { \
+            sum += features[i * wave.pixel_count + pixel].feature; \
+        } \
+        film[place] = sum; \
     }
-    if (wants_albedo) {
-        film_albedo[place] = albedo;
-    }
-    if (wants_normal) {
-        film_normal[place] = normal;
-    }
-    if (wants_position) {
-        film_position[place] = position;
-    }
-}
 
 void deposit_pixel(uint pixel, PathIndex index) {
     // Training rays are counted, but their light stays out of the picture.
@@ -74,7 +58,9 @@ void deposit_pixel(uint pixel, PathIndex index) {
         film_unfiltered[place] = unfiltered;
     }
     if (adds) {
-        add_features(pixel, place);
+        ADD_FEATURE(AOV_ALBEDO, film_albedo, albedo)
+        ADD_FEATURE(AOV_NORMAL, film_normal, normal)
+        ADD_FEATURE(AOV_POSITION, film_position, position)
     }
     if (adds && (wave.aovs & AOV_VISIBLE) != 0u) {
         film_visible[place] += shadow_rays;
