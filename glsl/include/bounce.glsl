@@ -49,7 +49,7 @@ bool follow_bounce(
     uint seed) {
     PathState state = paths[path];
     vec3 throughput = state.throughput * factor;
-    float strongest = max(throughput.r, max(throughput.g, throughput.b));
+    float strongest = largest_of(throughput);
     if (wave.vertex + 1u >= ROULETTE_VERTEX && strongest > 0.0) {
         float survival = min(1.0, strongest / ROULETTE_THROUGHPUT);
         float u_roulette = random_1d(

@@ -68,7 +68,7 @@ PrincipledAlbedo principled_albedo(Material material, float cosine) {
     vec2 specular = ggx_schlick_albedo(material.table_offset, material.alpha, cosine);
     float rise = cosine_table(material.table_offset + DIFFUSE_RISE_OFFSET, 1u, cosine);
     vec3 dielectric = mix(material.eta, material.k, rise);
-    float strongest = max(dielectric.r, max(dielectric.g, dielectric.b));
+    float strongest = largest_of(dielectric);
     return PrincipledAlbedo(
         mix(material.eta, material.reflectance, metallic) * specular.x
             + mix(material.k, vec3(1.0), metallic) * specular.y,
@@ -88,7 +88,7 @@ vec3 principled_value(Material material, float reflection, float cosine_differen
     float metallic = material.ior;
     vec3 metal = fresnel_schlick(cosine_difference, material.reflectance);
     vec3 dielectric = mix(material.eta, material.k, schlick_rise(cosine_difference));
-    float strongest = max(dielectric.r, max(dielectric.g, dielectric.b));
+    float strongest = largest_of(dielectric);
     vec3 base = (1.0 - strongest) / PI * material.reflectance;
     return mix(base + reflection * dielectric, reflection * metal, metallic);
 }

@@ -100,11 +100,10 @@ void bvh_enter_instance(uint instance, bool any_hit) {
     vec4 y = instance_row(instance, 1u);
     vec4 z = instance_row(instance, 2u);
     vec4 margin = instance_row(instance, 7u);
-    vec3 size = abs(bvh_origin);
     bvh_instance = instance;
     bvh_node_origin = map_point(x, y, z, bvh_origin);
     bvh_node_direction = map_vector(x, y, z, bvh_direction);
-    bvh_node_margin = margin.xyz * (margin.w + max(size.x, max(size.y, size.z)));
+    bvh_node_margin = margin.xyz * (margin.w + largest_of(abs(bvh_origin)));
     bvh_world_x = instance_row(instance, 3u);
     bvh_world_y = instance_row(instance, 4u);
     bvh_world_z = instance_row(instance, 5u);
@@ -442,8 +441,7 @@ Hit surface_at(uint triangle, uint instance, vec3 origin, vec3 direction) {
     hit.material = triangle_material(triangle, instance);
     vec3 normal = cross(b - a, c - a);
     // Scale first: the squares of a small triangle's components would underflow.
-    vec3 size = abs(normal);
-    normal = normalize(normal / max(size.x, max(size.y, size.z)));
+    normal = normalize(normal / largest_of(abs(normal)));
     hit.geometric_normal = dot(normal, direction) > 0.0 ? -normal : normal;
     vec3 shading_normal = hit.geometric_normal;
     if (texel_a.w != FLAT_NORMAL) {
@@ -483,8 +481,7 @@ float ray_offset() {
     vec3 extent = 255.0 * vec3(
         uintBitsToFloat((root.w & 0xffu) << 23), uintBitsToFloat((root.w & 0xff00u) << 15),
         uintBitsToFloat((root.w & 0xff0000u) << 7));
-    vec3 size = max(abs(corner), abs(corner + extent));
-    return RAY_OFFSET_SHARE * max(size.x, max(size.y, size.z));
+    return RAY_OFFSET_SHARE * largest_of(max(abs(corner), abs(corner + extent)));
 }
 
 // Moves `position` by `offset` to the side of the surface that `direction` leads to.

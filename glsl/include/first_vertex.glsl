@@ -27,7 +27,7 @@ void evaluate_first(
     brdf_evaluate_and_pdf(reflector, incident_local, value, pdf);
     throughput = vertex.throughput * value * incident_local.z;
     bool goes = pdf > 0.0 && dot(direction, vertex.geometric_normal) > 0.0
-        && max(throughput.r, max(throughput.g, throughput.b)) > 0.0;
+        && largest_of(throughput) > 0.0;
     throughput = goes ? throughput : vec3(0.0);
     pdf = goes ? pdf : 0.0;
 }

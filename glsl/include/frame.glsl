@@ -35,6 +35,10 @@ vec3 to_world(Frame frame, vec3 direction_local) {
         + frame.normal * direction_local.z;
 }
 
+float largest_of(vec3 numbers) {
+    return max(numbers.x, max(numbers.y, numbers.z));
+}
+
 // Folds the lower half of the octahedron over the upper, and back.
 vec2 octahedron_fold(vec2 p) {
     return (1.0 - abs(p.yx)) * vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);

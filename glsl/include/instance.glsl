@@ -4,6 +4,7 @@
 // to 5); root node, first material, mask of materials and flags (6); margin of node boxes per metre of
 // reach, and reach (7). Triangles in world space belong to a record that changes nothing.
 
+#include "frame.glsl"
 #include "layout.glsl"
 #include "surfaces.glsl"
 
@@ -44,8 +45,7 @@ vec3 instance_normal(uint instance, vec3 normal) {
     vec4 z = instance_row(instance, 2u);
     vec3 world = normal.x * x.xyz + normal.y * y.xyz + normal.z * z.xyz;
     // Scale first: squares of an instance of extreme scale would overflow.
-    vec3 size = abs(world);
-    float largest = max(size.x, max(size.y, size.z));
+    float largest = largest_of(abs(world));
     return largest > 0.0 ? normalize(world / largest) : vec3(0.0);
 }
 

@@ -203,8 +203,7 @@ vec4 gradient_tangent(vec3 edge_1, vec3 edge_2, vec2 image_1, vec2 image_2, vec3
     vec3 along_u = turn * (image_2.y * edge_1 - image_1.y * edge_2);
     vec3 along_v = turn * (image_1.x * edge_2 - image_2.x * edge_1);
     vec3 tangent = along_u - dot(along_u, normal) * normal;
-    vec3 size = abs(tangent);
-    float largest = max(size.x, max(size.y, size.z));
+    float largest = largest_of(abs(tangent));
     if (area == 0.0 || !(largest > 0.0)) {
         return vec4(0.0);
     }

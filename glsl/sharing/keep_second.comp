@@ -21,7 +21,7 @@ void keep_second(uint path) {
     }
     FirstVertex first = load_first_vertex(path);
     PathState state = paths[path];
-    float strongest = max(state.throughput.r, max(state.throughput.g, state.throughput.b));
+    float strongest = largest_of(state.throughput);
     if (first.material == NO_MATERIAL || strongest <= 0.0) {
         return;
     }
@@ -30,7 +30,7 @@ void keep_second(uint path) {
     float pdf;
     Frame frame = frame_from_normal(first.shading_normal);
     evaluate_first(first, first_reflector(first, frame), frame, direction, expected, pdf);
-    float most = max(expected.r, max(expected.g, expected.b));
+    float most = largest_of(expected);
     if (most <= 0.0) {
         return;
     }

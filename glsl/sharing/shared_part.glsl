@@ -10,10 +10,6 @@ const float LARGEST_SHARED_VALUE = 4.0;
 // Added to that value where light is chosen for other pixels, which may see more of it, 1/sr.
 const float BROAD_VALUE = 0.1;
 
-float largest_of(vec3 channels) {
-    return max(channels.r, max(channels.g, channels.b));
-}
-
 // Share of `value` below the largest that is shared.
 float shared_share(vec3 value) {
     return LARGEST_SHARED_VALUE / max(LARGEST_SHARED_VALUE, largest_of(value));
