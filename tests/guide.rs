@@ -4,9 +4,7 @@
 
 use fenestra::{
     math::random::{hash_4d, random_independent_2d},
-    sampler::guided::{
-        ARRIVAL_DIRECTIONS, CellKey, Guide, GuideState, decode_entry, decode_visibility,
-    },
+    sampler::guided::{ARRIVAL_DIRECTIONS, CellKey, Guide, decode_entry, decode_visibility},
     sampler::regions::{FACE_COUNT, PARENT_COUNT, Partition},
     scene::environment::{EnvironmentMap, EnvironmentTables},
     shader::{
@@ -409,21 +407,10 @@ fn cells_learn_what_their_surfaces_reflect() {
     let many: Vec<_> = counted.iter().map(|count| count.map(|word| 16 * word)).collect();
     guide.add(0, &many);
     guide.add(0, &many);
-    let again = Guide::resume(regions, 1 << 12, 1 << 14, &state_of(&guide), 1);
-    assert_eq!(again.count_words(), guide.count_words());
+    let again = Guide::resume(regions, 1 << 12, 1 << 14, &guide.state(), 1);
+    assert_eq!(again.state().counts, guide.state().counts);
     assert_eq!(again.snapshot(&partition), guide.snapshot(&partition));
     assert!(guide.counts(place)[strong].trials_in_rays() <= 65_536.0);
-}
-
-/// State with the cells and counts of a guide.
-fn state_of(guide: &Guide) -> GuideState {
-    GuideState {
-        keys: guide.keys().iter().map(|key| key.0).collect(),
-        refined: guide.refined(),
-        counts: guide.count_words(),
-        shares: guide.shares().to_vec(),
-        ..GuideState::default()
-    }
 }
 
 /// Four cells: the first sees half of the rays of every region; the second all rays of half of the
@@ -459,12 +446,12 @@ fn cells_are_refined_whose_rays_disagree() {
         guide
     };
     let refined = |guide: &Guide| -> Vec<CellKey> {
-        guide.refined().iter().map(|&cell| guide.keys()[cell as usize]).collect()
+        guide.state().refined.iter().map(|&cell| guide.keys()[cell as usize]).collect()
     };
     let mut guide = learn(1 << 12);
     assert_eq!(refined(&guide), [mixed, other], "the greatest variance first");
     guide.refine();
-    assert_eq!(guide.refined().len(), 2, "once only");
+    assert_eq!(guide.state().refined.len(), 2, "once only");
     // Leave room for four more cells, besides the eighth that stays free for cells not seen yet.
     let cells = guide.cell_count();
     assert_eq!(refined(&learn((cells + 4) * 8 / 7 + 1)), [mixed]);
@@ -504,8 +491,8 @@ fn cells_are_refined_whose_rays_disagree() {
     }
     assert!(visibility(&guide, mixed, 7) < 0.8 * before);
 
-    let again = Guide::resume(regions, 1 << 12, 1 << 14, &state_of(&guide), 1);
-    assert_eq!(again.refined(), guide.refined());
+    let again = Guide::resume(regions, 1 << 12, 1 << 14, &guide.state(), 1);
+    assert_eq!(again.state().refined, guide.state().refined);
     assert_eq!(again.snapshot(&partition), guide.snapshot(&partition));
 }
 
@@ -708,9 +695,9 @@ fn cells_learn_where_light_arrives_from() {
     assert!(reflected(&snapshot, bright) > reflected(&before, bright));
 
     // Words restore the light, and an update without counts leaves it as it is.
-    let words = guide.arrivals();
+    let words = guide.state().arrivals;
     let again = Guide::new(64, 100, 256).with_bounces(&words[..6 * ARRIVAL_DIRECTIONS], 1);
-    assert_eq!(again.arrivals(), words[..6 * ARRIVAL_DIRECTIONS]);
+    assert_eq!(again.state().arrivals, words[..6 * ARRIVAL_DIRECTIONS]);
     guide.add_arrivals(&[], &before.reflected);
-    assert_eq!(guide.arrivals(), words, "nothing was counted");
+    assert_eq!(guide.state().arrivals, words, "nothing was counted");
 }

@@ -288,16 +288,11 @@ impl GuideBuffers {
         Ok(GuideState {
             origin: self.origin.clone(),
             rectangles: self.partition.rectangles(),
-            keys: self.learned.keys().iter().map(|key| key.0).collect(),
-            refined: self.learned.refined(),
-            counts: self.learned.count_words(),
-            shares: self.learned.shares().to_vec(),
             pending: self.counts.download(counted)?,
             pending_shares: self.shares.download(self.learned.cell_count() * SHARE_WORDS)?,
             missing: missing.into_iter().map(|key| !key).collect(),
-            arrivals: self.learned.arrivals(),
             pending_arrivals: pending_arrivals.unwrap_or_default(),
-            ..GuideState::default()
+            ..self.learned.state()
         })
     }
 
@@ -331,6 +326,11 @@ impl GuideBuffers {
         })?;
         let has_moved = here.geometry != there.geometry;
         let forget = if has_moved { FORGETTING } else { 1 };
+        self.origin.grid_origin = there.grid_origin;
+        self.origin.largest_edge = edge;
+        self.layout.grid_origin = there.grid_origin;
+        self.layout.largest_edge = edge;
+        self.layout.finest_edge = edge * 0.5_f32.powi(LEVELS);
         self.take_regions(partition)?;
         let learned = Guide::resume(
             self.partition.regions.len(),
@@ -340,12 +340,6 @@ impl GuideBuffers {
             forget,
         );
         self.learned = self.with_bounces(learned, &state.arrivals, forget);
-        self.origin.grid_origin = there.grid_origin;
-        self.origin.largest_edge = edge;
-        self.layout.grid_origin = there.grid_origin;
-        self.layout.largest_edge = edge;
-        self.layout.finest_edge = edge * 0.5_f32.powi(LEVELS);
-        self.parameters.upload(bytemuck::bytes_of(&self.layout))?;
         self.clear_counts()?;
         let room = self.learned.cell_count() * self.partition.regions.len();
         self.counts

@@ -35,7 +35,7 @@ pub struct Guide {
     counts: Vec<Count>,
     pub(super) region_count: usize,
     /// Evidence of visible rays on the share of the BRDF, [`SHARE_WORDS`] words per cell.
-    shares: Vec<u32>,
+    pub(super) shares: Vec<u32>,
     /// Light that arrives from surfaces, if bounces teach.
     pub(super) arriving: Option<ArrivingLight>,
 }
@@ -125,25 +125,17 @@ impl Guide {
         }
     }
 
-    /// Indices of the refined cells, as [`Self::resume`] takes them.
-    pub fn refined(&self) -> Vec<u32> {
-        self.cells.refined().iter().map(|&cell| cell as u32).collect()
-    }
-
-    /// Counts of all cells, as [`Self::resume`] takes them.
-    pub fn count_words(&self) -> Vec<CountWords> {
-        self.counts.iter().map(|count| [count.trials, count.hits, count.response]).collect()
-    }
-
-    /// Evidence of visible rays on the share of the BRDF, as [`Self::resume`] takes it.
-    pub fn shares(&self) -> &[u32] {
-        &self.shares
-    }
-
-    /// Light found by bounces, as [`Self::with_bounces`] takes it; empty where bounces do not
-    /// teach.
-    pub fn arrivals(&self) -> Vec<ArrivalWords> {
-        self.arriving.as_ref().map(ArrivingLight::words).unwrap_or_default()
+    /// Returns cells and counts, as [`Self::resume`] and [`Self::with_bounces`] take them.
+    pub fn state(&self) -> GuideState {
+        let words = |count: &Count| [count.trials, count.hits, count.response];
+        GuideState {
+            keys: self.keys().iter().map(|key| key.0).collect(),
+            refined: self.cells.refined().iter().map(|&cell| cell as u32).collect(),
+            counts: self.counts.iter().map(words).collect(),
+            shares: self.shares.clone(),
+            arrivals: self.arriving.as_ref().map(ArrivingLight::words).unwrap_or_default(),
+            ..GuideState::default()
+        }
     }
 
     /// Number of cells, faces included.

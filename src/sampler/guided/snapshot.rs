@@ -101,7 +101,7 @@ impl Guide {
     /// is its parent, that of a face the scene.
     fn brdf_shares(&self, tree: &Tree) -> Vec<u32> {
         let mut sums: Vec<ShareEvidence> =
-            self.shares().par_chunks(SHARE_WORDS).map(ShareEvidence::from_counts).collect();
+            self.shares.par_chunks(SHARE_WORDS).map(ShareEvidence::from_counts).collect();
         let mut scene = ShareEvidence::default();
         for evidence in &sums {
             scene.add(*evidence);
