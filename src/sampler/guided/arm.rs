@@ -88,24 +88,6 @@ const GPU_PRICES: Prices = Prices {
     cohort: 2.9,
 };
 
-impl Prices {
-    /// Returns the time that a path of `arm` takes on average.
-    fn time(&self, arm: &Arm, work: Work) -> f64 {
-        let [first, later] = arm.rays.map(f64::from);
-        let (rays, shadow_rays) = (work.rays / work.paths, work.shadow_rays / work.paths);
-        let direction = |is_guided| {
-            let [one, more] = self.guided_candidates;
-            let guided = one + more * f64::from(arm.candidates - 1);
-            if is_guided { guided } else { self.direction }
-        };
-        let directions = first * direction(arm.is_guided)
-            + (rays - 1.0) * later * direction(arm.is_guided && arm.guides_later);
-        let bounce = if arm.guides_bounces { self.guided_bounce } else { 0.0 };
-        let cohort = if arm.shares_paths { self.cohort } else { 0.0 };
-        rays * (self.ray + bounce) + shadow_rays * self.shadow_ray + directions + cohort
-    }
-}
-
 impl fmt::Display for Arm {
     /// Formats "guided, 8 + 2 rays, later ones as mis, 4 candidates, shared paths, roulette below 0.02".
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -220,7 +202,19 @@ impl Arms {
 
     /// Returns the time that a path of `arm` takes on average, in the unit of the device's prices.
     pub(super) fn time(&self, arm: &Arm, work: Work) -> f64 {
-        self.prices.time(arm, work)
+        let prices = self.prices;
+        let [first, later] = arm.rays.map(f64::from);
+        let (rays, shadow_rays) = (work.rays / work.paths, work.shadow_rays / work.paths);
+        let direction = |is_guided| {
+            let [one, more] = prices.guided_candidates;
+            let guided = one + more * f64::from(arm.candidates - 1);
+            if is_guided { guided } else { prices.direction }
+        };
+        let directions = first * direction(arm.is_guided)
+            + (rays - 1.0) * later * direction(arm.is_guided && arm.guides_later);
+        let bounce = if arm.guides_bounces { prices.guided_bounce } else { 0.0 };
+        let cohort = if arm.shares_paths { prices.cohort } else { 0.0 };
+        rays * (prices.ray + bounce) + shadow_rays * prices.shadow_ray + directions + cohort
     }
 
     /// The arm before any measurement.
