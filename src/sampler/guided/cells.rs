@@ -44,20 +44,12 @@ impl Tree {
         self.walk(self.generations.iter(), value)
     }
 
-    /// As [`Self::down`], children first.
-    pub(super) fn up<T: Clone + Default + Send + Sync>(
-        &self,
-        value: impl Fn(usize, &[T]) -> T + Sync,
-    ) -> Vec<T> {
-        self.walk(self.generations.iter().rev(), value)
-    }
-
     /// Sums what `own` tells of every inner cell and its descendants, part by part; empty for the leaves.
     pub(super) fn sums<T: Copy + AddAssign + Send + Sync, Own: Iterator<Item = T>>(
         &self,
         own: impl Fn(usize) -> Own + Sync,
     ) -> Vec<Vec<T>> {
-        self.up(|cell, sums: &[Vec<T>]| {
+        self.walk(self.generations.iter().rev(), |cell, sums: &[Vec<T>]| {
             let mut sum: Vec<T> = own(cell).collect();
             for &child in &self.children[cell] {
                 if sums[child].is_empty() {
