@@ -221,11 +221,6 @@ impl Renderer {
         Ok(())
     }
 
-    /// Returns the technique if it is a `T`.
-    pub fn technique<T: Technique>(&self) -> Option<&T> {
-        (self.technique.as_ref() as &dyn Any).downcast_ref()
-    }
-
     /// Calls `work` with technique, runner and progress if the technique is a `T`.
     pub fn with_technique<T: Technique, R>(
         &mut self,

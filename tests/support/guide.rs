@@ -1,5 +1,7 @@
 //! State that the sampler `guided` has learned, as fields and not as the content of a file.
 
+use std::path::Path;
+
 use fenestra::{
     Error, Result,
     sampler::guided::{GuideState, Guided},
@@ -18,7 +20,8 @@ pub trait Guide {
 
 impl Guide for Renderer {
     fn guide_state(&self) -> Result<Option<GuideState>> {
-        self.technique::<Guided>().map(|guided| guided.state(self.sample_count())).transpose()
+        let state = |bytes: Vec<u8>| GuideState::from_bytes(&bytes, Path::new("guide"));
+        self.guide()?.map(state).transpose()
     }
 
     fn restore_guide(&mut self, state: &GuideState) -> Result<bool> {

@@ -119,20 +119,6 @@ pub struct Guided {
 }
 
 impl Guided {
-    /// Returns what was learned in a film of `samples` samples per pixel. Fails if the device does.
-    pub fn state(&self, samples: u32) -> Result<GuideState> {
-        Ok(GuideState {
-            samples,
-            rebuilt_at: self.rebuilt_at,
-            is_open: self.is_open,
-            arm: (self.choice.races > 0).then_some(self.choice.arm),
-            arm_since: self.choice.since,
-            races: self.choice.races,
-            tag: self.tag,
-            ..self.buffers.state()?
-        })
-    }
-
     /// Continues from what an earlier render learned, without training: bit for bit, if the film
     /// holds as many samples as it did when the state was taken. Takes its arm too, as far as the settings
     /// leave a choice. Returns true if the geometry differs, so that most was forgotten.
@@ -360,8 +346,17 @@ impl Technique for Guided {
     }
 
     fn save(&self, samples: u32) -> Result<Option<Vec<u8>>> {
-        let bytes = self.state(samples)?.to_bytes();
-        bytes.map(Some).map_err(|source| Error::io("guide".as_ref(), "encode", source))
+        let state = GuideState {
+            samples,
+            rebuilt_at: self.rebuilt_at,
+            is_open: self.is_open,
+            arm: (self.choice.races > 0).then_some(self.choice.arm),
+            arm_since: self.choice.since,
+            races: self.choice.races,
+            tag: self.tag,
+            ..self.buffers.state()?
+        };
+        state.to_bytes().map(Some).map_err(|source| Error::io("guide".as_ref(), "encode", source))
     }
 
     fn load(&mut self, runner: &mut Runner, progress: &Progress, saved: Saved<'_>) -> Result<bool> {
