@@ -1,9 +1,8 @@
 //! Settings of a render, and checks that they can be rendered.
 
-use crate::film::Window;
 use crate::{
     error::{Error, Result},
-    film::Aov,
+    film::{Aov, Window},
     pass::{PathLists, Roulette},
     sampler::{Parameters, Sampler},
     scene::{Filter, Scene},
@@ -60,12 +59,8 @@ impl Default for Settings {
 
 /// Returns the window of `settings`, or the whole film.
 pub fn window_of(settings: &Settings, scene: &Scene) -> Window {
-    settings.window.unwrap_or(Window {
-        x: 0,
-        y: 0,
-        width: scene.film.width,
-        height: scene.film.height,
-    })
+    let [width, height] = [scene.film.width, scene.film.height];
+    settings.window.unwrap_or(Window { x: 0, y: 0, width, height })
 }
 
 /// Returns the window whose samples the picture needs: around that of `settings`, one pixel more where

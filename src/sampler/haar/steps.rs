@@ -29,10 +29,6 @@ impl HaarSteps {
         Self { parameters: *parameters, depth, surfaces, shadow_rays }
     }
 
-    fn has_cache(&self) -> bool {
-        self.parameters.haar.has_cache
-    }
-
     fn kernel(&self, shader: &'static str, constants: &[(u32, u32)]) -> Kernel {
         let own = [
             (CONSTANT_HAAR_LEVEL, self.parameters.haar.level),
@@ -51,7 +47,7 @@ pub(super) fn cache_places(parameters: &Parameters, shadow_rays: u32) -> u32 {
 impl Steps for HaarSteps {
     /// One with a cache, since each shadow ray teaches the next.
     fn rays_per_group(&self) -> u32 {
-        if self.has_cache() { 1 } else { SHADOW_RAYS_PER_GROUP }
+        if self.parameters.haar.has_cache { 1 } else { SHADOW_RAYS_PER_GROUP }
     }
 
     fn prepare(&self, _wave: &Wave) -> Vec<Kernel> {
@@ -69,7 +65,7 @@ impl Steps for HaarSteps {
 
     fn after_shadow_rays(&self, wave: &Wave) -> Vec<Kernel> {
         let is_last = wave.first_shadow_ray + wave.shadow_ray_count >= wave.total_shadow_rays;
-        if !self.has_cache() || is_last {
+        if !self.parameters.haar.has_cache || is_last {
             return Vec::new();
         }
         let visibility = self.parameters.visibility;
