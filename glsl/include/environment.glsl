@@ -194,6 +194,17 @@ EnvironmentSample environment_sample_cell(uint column, uint row, vec2 u) {
     return EnvironmentSample(environment_world_from_map(direction), light.xyz, pdf);
 }
 
+// Moves `first` to the first number for which `exceeds` is true, an expression of `middle`; at most `last`.
+#define FIND_FIRST(first, last, exceeds) \
+    while (first < last) { \
+        uint middle = (first + last) >> 1u; \
+        if (exceeds) { \
+            last = middle; \
+        } else { \
+            first = middle + 1u; \
+        } \
+    }
+
 // Samples a direction with density environment_pdf, from two numbers in [0, 1).
 EnvironmentSample environment_sample(vec2 u) {
     if (environment_density_total() <= 0.0) {
@@ -208,14 +219,7 @@ EnvironmentSample environment_sample(vec2 u) {
     uint interval = uint(u.y * float(guide_size(height + 1u)));
     uint row = uint(environment_row(row_guide + interval));
     uint last = uint(environment_row(row_guide + interval + 1u));
-    while (row < last) {
-        uint middle = (row + last) >> 1u;
-        if (environment_row(middle) > u.y) {
-            last = middle;
-        } else {
-            row = middle + 1u;
-        }
-    }
+    FIND_FIRST(row, last, environment_row(middle) > u.y)
     float before = row > 0u ? environment_row(row - 1u) : 0.0;
     float row_remainder =
         min((u.y - before) / (environment_row(row) - before), 0.99999994);
@@ -225,14 +229,7 @@ EnvironmentSample environment_sample(vec2 u) {
     interval = first_cell + width + uint(u.x * float(guide));
     uint column = uint(environment_cell_value(interval));
     last = uint(environment_cell_value(interval + 1u));
-    while (column < last) {
-        uint middle = (column + last) >> 1u;
-        if (environment_cell_value(first_cell + middle) > u.x) {
-            last = middle;
-        } else {
-            column = middle + 1u;
-        }
-    }
+    FIND_FIRST(column, last, environment_cell_value(first_cell + middle) > u.x)
     before = column > 0u ? environment_cell_value(first_cell + column - 1u) : 0.0;
     float column_remainder = min(
         (u.x - before) / (environment_cell_value(first_cell + column) - before), 0.99999994);

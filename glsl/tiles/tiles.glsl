@@ -22,14 +22,7 @@ EnvironmentSample draw_from_tiles(uint sector, uvec2 bits, uvec4 more_bits) {
     // Find the first tile whose cumulative probability exceeds the number: never one without any.
     uint tile = 0u;
     uint last = TILES - 1u;
-    while (tile < last) {
-        uint middle = (tile + last) >> 1u;
-        if (texelFetch(tile_entries, int(first + middle)).y > wanted) {
-            last = middle;
-        } else {
-            tile = middle + 1u;
-        }
-    }
+    FIND_FIRST(tile, last, texelFetch(tile_entries, int(first + middle)).y > wanted)
     EnvironmentSample light =
         region_sample(tile_aliases, texelFetch(tile_regions, int(tile)), bits.y, more_bits);
     light.pdf *= uintBitsToFloat(texelFetch(tile_entries, int(first + tile)).x);
