@@ -65,8 +65,8 @@ fn entry_points(folder: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(entries(folder)?.into_iter().filter(is_entry_point).collect())
 }
 
-/// A macro that defines `load(index)`, which puts a struct together from its texels: of four words each, or of
-/// two where it does not fill those.
+/// A macro that defines `load(index)`, which puts a struct together from its texels: of four words each, or
+/// of two where it does not fill those.
 fn loader(shared: &SharedStruct) -> String {
     let words = shared.size / 4;
     let width = if words.is_multiple_of(4) { 4 } else { 2 };

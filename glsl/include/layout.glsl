@@ -15,8 +15,8 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 #define TEXELS(name) TEXELS_##name
 // Declares texels that hold a struct each, and `load`, which returns that of an index.
 #define LOADS(Struct, load, texels) TEXELS(texels) LOADS_##Struct(load, texels)
-// Declares texels in up to four pages of 1 << PAGE_SHIFT elements, and `fetch`, which returns texel `part` of an
-// element of `size` texels; with one page the choice folds away.
+// Declares texels in up to four pages of 1 << PAGE_SHIFT elements, and `fetch`, which returns texel `part` of
+// an element of `size` texels; with one page the choice folds away.
 #define PAGED_TEXELS(fetch, texels, size, PAGES, PAGE_SHIFT) \
     TEXELS(texels##_0) TEXELS(texels##_1) TEXELS(texels##_2) TEXELS(texels##_3) \
     uvec4 fetch(uint element, uint part) { \
