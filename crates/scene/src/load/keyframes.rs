@@ -10,9 +10,9 @@ use crate::{
 };
 
 impl Loader<'_> {
-    /// Returns the camera at the time of the options: that of the key frames, each number along a smooth curve
-    /// that never leaves the range of its two keys; before the first and after the last it stands. Without a
-    /// time or key frames, the camera of `[camera]`.
+    /// Returns the camera at the time of the options: that of the key frames, each number along a smooth
+    /// curve that never leaves the range of its two keys; before the first and after the last it stands.
+    /// Without a time or key frames, the camera of `[camera]`.
     pub(super) fn camera_at(&self, file: &SceneFile) -> Result<CameraEntry> {
         let mut keys = Vec::new();
         for Entry { keys: frame, .. } in &file.keyframes {
