@@ -397,6 +397,13 @@ fn a_guide_of_another_scene_is_refused_or_mostly_forgotten() {
     assert!(pupil.restore_guide(&state).unwrap(), "something moved");
     pupil.render_pass(2).unwrap();
     assert_eq!(pupil.totals().camera_rays, 2 * 32 * 24, "no training");
+    // A scene is open by its geometry.
+    let open = GuideState { is_open: true, ..state.clone() };
+    for (scene, stays) in [(&room, true), (&moved, false)] {
+        let mut pupil = support::renderer(scene, guided(1));
+        pupil.restore_guide(&open).unwrap();
+        assert_eq!(pupil.guide_state().unwrap().unwrap().is_open, stays);
+    }
     let mut damaged = state.clone();
     damaged.rectangles[3][2] += 1;
     let mut pupil = support::renderer(&room, guided(1));

@@ -9,15 +9,20 @@ use fenestra::{
     math::random::hash_4d,
     pass::SceneBuffers,
     sampler::Sampler,
-    scene::Scene,
+    scene::{
+        Scene,
+        lamp::{LampKind, Spot, SpotFalloff},
+    },
     session::Settings,
-    shader::constants::{CONSTANT_SURFACES, SURFACES_LAMP_CELLS},
+    shader::constants::{CONSTANT_SURFACES, LAMP_BIT, SURFACES_LAMP_CELLS},
 };
+use glam::Vec3;
 
 use crate::support::{
     self,
     command::Folder,
     replicates::{assert_near, replicates},
+    scenes,
     statistics::chi_square_p_value,
 };
 
@@ -125,6 +130,34 @@ fn lamps_are_drawn_as_their_probabilities_say() {
         likely.push(shares[0].1);
     }
     assert_ne!(likely[0], likely[1]);
+}
+
+/// Every second one of the spots in a row above a floor shines upwards.
+#[test]
+fn spots_are_drawn_where_they_shine() {
+    let _alone = support::alone();
+    let mut scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
+    for spot in 0..40 {
+        let spot = Spot {
+            position: Vec3::new(2.0 * (spot - 20) as f32, 2.0, 0.0),
+            direction: if spot % 2 == 0 { Vec3::NEG_Y } else { Vec3::Y },
+            intensity: Vec3::ONE,
+            inner_angle_rad: 0.0,
+            outer_angle_rad: 0.8,
+            falloff: SpotFalloff::SquaredCosine,
+        };
+        scenes::add_lamp(&mut scene, LampKind::Spot(spot));
+    }
+    let window = Window { x: 0, y: 0, width: 16, height: 8 };
+    let buffers = SceneBuffers::new(support::device(), &scene, window).unwrap();
+    let answers = draws(&buffers, [0.0; 3]);
+    let share = |is_wanted: fn(u32) -> bool| -> f64 {
+        let count = answers.iter().filter(|answer| is_wanted(answer.source & !LAMP_BIT)).count();
+        count as f64 / answers.len() as f64
+    };
+    let [own, upwards] = [share(|spot| spot == 20), share(|spot| spot % 2 == 1)];
+    eprintln!("{own:.3} for the spot above, {upwards:.3} for those that shine upwards");
+    assert!(own > 0.25 && upwards < 0.2, "{own} for the spot above, {upwards} upwards");
 }
 
 /// Alone, its lamp is all there is and drawn by power.

@@ -330,7 +330,7 @@ fn runs_made_under_other_conditions_are_not_mixed_in() {
 fn overhead_is_measured_in_rounds() {
     let folder = folder();
     let options = words(
-        "study yard.toml --samplers=mis,ris,ris:candidates=8 --overhead --repetitions=3 -o report \
+        "study yard.toml --samplers=mis,tiles,ris:candidates=8 --overhead --repetitions=3 -o report \
          --quiet",
     );
     folder.run(&options).assert(0, &[]);
@@ -338,7 +338,14 @@ fn overhead_is_measured_in_rounds() {
     assert_eq!(results["rounds"].as_array().unwrap().len(), 3);
     let overheads = results["overheads"].as_array().unwrap();
     let names: Vec<_> = overheads.iter().map(|o| o["sampler"].as_str().unwrap()).collect();
-    assert_eq!(names, ["ris:candidates=8", "ris"].iter().rev().copied().collect::<Vec<_>>());
+    assert_eq!(names, ["tiles", "ris:candidates=8"]);
+    for repetition in 1..=3 {
+        let round = json(&folder, &format!("runs/yard/overhead-{repetition}.json"));
+        for timing in round["timings"].as_array().unwrap() {
+            let has_tiles = timing["gpu_ms_per_sample"].get("sample_tiles").is_some();
+            assert_eq!(has_tiles, timing["sampler"] == "tiles", "round {repetition}: {timing}");
+        }
+    }
     for overhead in overheads {
         assert_eq!(overhead["baseline"], "mis");
         assert_eq!(overhead["rounds"], 3);

@@ -204,3 +204,26 @@ pub(crate) fn judge_hemisphere(target: &HemisphereTarget, lobes: &[Lobe]) -> Fit
     }
     FitErrors::from_sums(sums, energy)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::hemisphere::sample_hemisphere;
+
+    /// Half of the density of a flat lobe lies below the horizon, where a flat target has none.
+    #[test]
+    fn figures_over_the_hemisphere_are_those_of_a_flat_lobe() {
+        let target = sample_hemisphere(&|_| 1.0, DVec3::Z);
+        let lobe = Lobe { axis: Vec3::Z, bandwidth: 0.0, amplitude: 1.0 };
+        let errors = judge_hemisphere(&target, &[lobe]);
+        let q = 0.5 * (1.0 - config::DEFENSIVE_SHARE) + config::DEFENSIVE_SHARE;
+        for (found, expected) in [
+            (errors.relative_l2, 0.0),
+            (errors.chi_squared, 1.0 / q - 1.0),
+            (errors.kullback_leibler, 2_f64.ln()),
+            (errors.energy_captured, 1.0),
+        ] {
+            assert!((found - expected).abs() < 1e-6, "{found} instead of {expected}");
+        }
+    }
+}

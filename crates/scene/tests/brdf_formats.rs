@@ -96,7 +96,7 @@ fn merl_invalid_cells_are_filled_from_their_neighbours() {
         if is_nan(cell) {
             [f64::NAN, f64::INFINITY, 1.0][channel]
         } else if (cell / 180) % 90 >= 60 {
-            -1.0
+            if cell % 3 == channel { -1.0 } else { 0.3 }
         } else {
             0.1 / SCALES[channel]
         }

@@ -107,24 +107,29 @@ fn x_of(index: usize) -> f32 {
 
 #[test]
 fn pbrt_objects() {
-    compare("room.pbrt", MANY, |uses| {
-        let mut text = "Scale -1 1 1 LookAt 0 0 -5 0 0 0 0 1 0 Camera \"perspective\" WorldBegin\n\
+    // The world is mirrored unless the camera already is.
+    for mirror in ["Scale -1 1 1 ", ""] {
+        compare("room.pbrt", MANY, |uses| pbrt_objects_of(mirror, uses));
+    }
+}
+
+fn pbrt_objects_of(mirror: &str, uses: usize) -> String {
+    let mut text = mirror.to_owned()
+        + "LookAt 0 0 -5 0 0 0 0 1 0 Camera \"perspective\" WorldBegin\n\
              LightSource \"infinite\" \"rgb L\" [1 1 1]\n\
              ObjectBegin \"sheet\" Scale 1 2 0.5 Shape \"plymesh\" \"string filename\" \"sheet.ply\"\n\
-             ObjectEnd\n"
-            .to_owned();
-        for index in (0..uses).rev() {
-            let (angle, sign) = turn(index);
-            writeln!(
-                text,
-                "AttributeBegin Translate {} 1 0 Rotate {angle} 0 1 0 Scale {sign} 1 1 \
+             ObjectEnd\n";
+    for index in (0..uses).rev() {
+        let (angle, sign) = turn(index);
+        writeln!(
+            text,
+            "AttributeBegin Translate {} 1 0 Rotate {angle} 0 1 0 Scale {sign} 1 1 \
                  ObjectInstance \"sheet\" AttributeEnd",
-                x_of(index)
-            )
-            .unwrap();
-        }
-        text
-    });
+            x_of(index)
+        )
+        .unwrap();
+    }
+    text
 }
 
 #[test]

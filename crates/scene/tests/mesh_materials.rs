@@ -371,11 +371,15 @@ fn morph_targets_move_vertices_by_their_weights() {
     let attributes = [positions(), Attribute::floats("_TARGET", "VEC3", &target)];
     let text = gltf_of(&attributes, 3, "", "");
     let text = text.replace("}}]}]", r#"}, "targets": [{"POSITION": 1}]}], "weights": [0.5]}]"#);
+    let of_node = text.replace(r#"[{"mesh": 0}]"#, r#"[{"mesh": 0, "weights": [0.25]}]"#);
     let folder = Folder::new();
-    let mut warnings = Vec::new();
-    let mesh = Mesh::read(&folder.write("a.gltf", text), &mut warnings).unwrap();
-    assert_eq!(mesh.positions, [[0.0, 0.0, 1.0], [1.0, 0.0, 2.0], [0.0, 1.0, 0.0]]);
-    assert!(warnings.is_empty(), "{warnings:?}");
+    for (text, weight) in [(text, 0.5), (of_node, 0.25)] {
+        let mut warnings = Vec::new();
+        let mesh = Mesh::read(&folder.write("a.gltf", text), &mut warnings).unwrap();
+        let moved = [[0.0, 0.0, 2.0 * weight], [1.0, 0.0, 4.0 * weight], [0.0, 1.0, 0.0]];
+        assert_eq!(mesh.positions, moved);
+        assert!(warnings.is_empty(), "{warnings:?}");
+    }
 }
 
 #[test]

@@ -56,7 +56,7 @@ pub(super) struct Work {
 
 /// Times for parts of the work, of which only the ratios count. A clock would know the machine better, but
 /// not be the same in every run.
-struct Prices {
+pub(super) struct Prices {
     ray: f64,
     shadow_ray: f64,
     /// Direction chosen as by `mis`.
@@ -87,6 +87,24 @@ const GPU_PRICES: Prices = Prices {
     guided_bounce: 0.12,
     cohort: 2.9,
 };
+
+impl Prices {
+    /// Returns the time that a path of `arm` takes on average.
+    pub(super) fn time(&self, arm: &Arm, work: Work) -> f64 {
+        let [first, later] = arm.rays.map(f64::from);
+        let (rays, shadow_rays) = (work.rays / work.paths, work.shadow_rays / work.paths);
+        let direction = |is_guided| {
+            let [one, more] = self.guided_candidates;
+            let guided = one + more * f64::from(arm.candidates - 1);
+            if is_guided { guided } else { self.direction }
+        };
+        let directions = first * direction(arm.is_guided)
+            + (rays - 1.0) * later * direction(arm.is_guided && arm.guides_later);
+        let bounce = if arm.guides_bounces { self.guided_bounce } else { 0.0 };
+        let cohort = if arm.shares_paths { self.cohort } else { 0.0 };
+        rays * (self.ray + bounce) + shadow_rays * self.shadow_ray + directions + cohort
+    }
+}
 
 impl fmt::Display for Arm {
     /// Formats "guided, 8 + 2 rays, later ones as mis, 4 candidates, shared paths, roulette below 0.02".
@@ -130,7 +148,7 @@ pub(super) enum Axes {
 
 /// The arms of one render: settings that are given, and those that a measurement may decide.
 pub(super) struct Arms {
-    prices: &'static Prices,
+    pub(super) prices: &'static Prices,
     guided: GuidedSteps,
     mis: RaySteps,
     roulette: Roulette,
@@ -198,23 +216,6 @@ impl Arms {
                 && has_paths
                 && settings.roulette == Roulette::default(),
         })
-    }
-
-    /// Returns the time that a path of `arm` takes on average, in the unit of the device's prices.
-    pub(super) fn time(&self, arm: &Arm, work: Work) -> f64 {
-        let prices = self.prices;
-        let [first, later] = arm.rays.map(f64::from);
-        let (rays, shadow_rays) = (work.rays / work.paths, work.shadow_rays / work.paths);
-        let direction = |is_guided| {
-            let [one, more] = prices.guided_candidates;
-            let guided = one + more * f64::from(arm.candidates - 1);
-            if is_guided { guided } else { prices.direction }
-        };
-        let directions = first * direction(arm.is_guided)
-            + (rays - 1.0) * later * direction(arm.is_guided && arm.guides_later);
-        let bounce = if arm.guides_bounces { prices.guided_bounce } else { 0.0 };
-        let cohort = if arm.shares_paths { prices.cohort } else { 0.0 };
-        rays * (prices.ray + bounce) + shadow_rays * prices.shadow_ray + directions + cohort
     }
 
     /// The arm before any measurement.
@@ -316,4 +317,36 @@ impl Arms {
 /// Returns the candidates per shadow ray that are given, or those before a measurement.
 pub(super) fn first_candidates(parameters: &Parameters) -> Result<u32> {
     parameters.candidates_among("guided", &GUIDED_CANDIDATES, GUIDED_CANDIDATES[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_of_a_path_is_that_of_its_parts() {
+        let mis = Arm {
+            is_guided: false,
+            guides_bounces: false,
+            guides_later: false,
+            shares_paths: false,
+            candidates: 3,
+            rays: [4, 2],
+            roulette_throughput: 0.1,
+        };
+        let guided = Arm { is_guided: true, ..mis };
+        let all = Arm { guides_bounces: true, guides_later: true, shares_paths: true, ..guided };
+        // Three rays and five shadow rays a path: one vertex of four directions, two of two.
+        let work = Work { paths: 10.0, rays: 30.0, shadow_rays: 50.0 };
+        let traced = 3.0 * 2.0 + 5.0 * 0.2;
+        let candidates = 0.65 + 2.0 * 0.28;
+        for (arm, expected) in [
+            (mis, traced + 8.0 * 0.4),
+            (guided, traced + 4.0 * candidates + 4.0 * 0.4),
+            (all, traced + 8.0 * candidates + 3.0 * 0.3 + 3.0),
+        ] {
+            let found = SOFTWARE_PRICES.time(&arm, work);
+            assert!((found - expected).abs() < 1e-9, "{arm}: {found} instead of {expected}");
+        }
+    }
 }

@@ -194,7 +194,7 @@ impl Race<'_> {
                 }
             }
             work[index] = round_work;
-            Ok(self.arms.time(&contenders[index], round_work))
+            Ok(self.arms.prices.time(&contenders[index], round_work))
         })?;
         self.buffers.clear_counts()?;
         runner.take_counters()?;

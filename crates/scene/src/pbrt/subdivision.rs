@@ -194,6 +194,13 @@ mod tests {
         // The limit of a vertex of valence 4: β = 3/32, γ = 1/(4 + 4), so half of it.
         let flat = subdivide(&octahedron().0, octahedron().1, 0).unwrap();
         assert_eq!(flat.positions[0], [0.5, 0.0, 0.0]);
+        // And of a tetrahedron's, of valence 3: β = 3/16, γ = 1/(3 + 2), so a fifth of it.
+        let corners = [[1.0; 3], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+        let faces = vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]];
+        for levels in [0, 1] {
+            let [x, y, z] = subdivide(&corners, faces.clone(), levels).unwrap().positions[0];
+            assert!([x, y, z].iter().all(|part| (part - 0.2).abs() < 1e-6), "{x} {y} {z}");
+        }
     }
 
     #[test]
