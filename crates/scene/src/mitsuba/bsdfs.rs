@@ -87,12 +87,9 @@ impl Reader {
                 model
             }
             "diffuse" | "lambertian" => {
-                let value = match self.value(&parameters, "reflectance", Role::Reflectance)? {
-                    Some(value) => value,
-                    None => {
-                        self.value_or(&parameters, "diffuse_reflectance", Role::Reflectance, 0.5)?
-                    }
-                };
+                let is_older = parameters.any("reflectance")?.is_none();
+                let name = if is_older { "diffuse_reflectance" } else { "reflectance" };
+                let value = self.value_or(&parameters, name, Role::Reflectance, 0.5)?;
                 colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
             }
             "difftrans" => {

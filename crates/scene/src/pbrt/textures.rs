@@ -156,11 +156,7 @@ impl<'a> Textures<'a> {
                         Ok(Value::Image(checkerboard(first, second, mapping)))
                     }
                     (first, _) => {
-                        self.log.ignore_named(
-                            features::PBRT_TEXTURE,
-                            "checkerboard",
-                            &entity.place,
-                        );
+                        self.log.ignore_named(features::PBRT_TEXTURE, &entity.name, &entity.place);
                         Ok(first)
                     }
                 }
