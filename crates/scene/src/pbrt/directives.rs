@@ -144,7 +144,7 @@ impl<'a> Reader<'a> {
             "TransformBegin" => self.states.save(Saved::TransformBegin, place),
             "TransformEnd" => self.states.restore(Saved::TransformBegin, &place),
             "Attribute" => {
-                let target = self.text("Attribute")?;
+                let target = self.text(name)?;
                 let parameters = read_parameters(&mut self.source)?;
                 self.states.now.attributes.add(&target, parameters, &place)
             }
@@ -251,27 +251,25 @@ impl<'a> Reader<'a> {
         let ctm = self.states.now.ctm;
         self.states.now.ctm = match name {
             "Identity" => DMat4::IDENTITY,
-            "Translate" => {
-                ctm * DMat4::from_translation(DVec3::from_array(self.numbers("Translate")?))
-            }
-            "Scale" => ctm * DMat4::from_scale(DVec3::from_array(self.numbers("Scale")?)),
+            "Translate" => ctm * DMat4::from_translation(DVec3::from_array(self.numbers(name)?)),
+            "Scale" => ctm * DMat4::from_scale(DVec3::from_array(self.numbers(name)?)),
             "Rotate" => {
-                let [angle_deg, x, y, z] = self.numbers("Rotate")?;
+                let [angle_deg, x, y, z] = self.numbers(name)?;
                 let axis = DVec3::new(x, y, z).try_normalize();
                 let axis =
                     axis.ok_or_else(|| place.error("Rotate: expected an axis with a direction"))?;
                 ctm * DMat4::from_axis_angle(axis, angle_deg.to_radians())
             }
             "LookAt" => {
-                let [a, b, c, d, e, f, g, h, i] = self.numbers("LookAt")?;
+                let [a, b, c, d, e, f, g, h, i] = self.numbers(name)?;
                 let view = look_at(DVec3::new(a, b, c), DVec3::new(d, e, f), DVec3::new(g, h, i));
                 let message =
                     "LookAt: eye and target must differ, and up must not lie between them";
                 ctm * view.ok_or_else(|| place.error(message))?
             }
             // Files give matrices column by column.
-            "Transform" => DMat4::from_cols_array(&self.numbers("Transform")?),
-            "ConcatTransform" => ctm * DMat4::from_cols_array(&self.numbers("ConcatTransform")?),
+            "Transform" => DMat4::from_cols_array(&self.numbers(name)?),
+            "ConcatTransform" => ctm * DMat4::from_cols_array(&self.numbers(name)?),
             "CoordinateSystem" => {
                 let system = self.text(name)?;
                 self.states.named.insert(system, ctm);
