@@ -42,6 +42,18 @@ pub(crate) struct Imported {
     pub warnings: Vec<String>,
 }
 
+/// Refractive indices that a coat may have.
+pub(crate) const COAT_IOR: (f32, f32) = (1.01, 4.0);
+/// Refractive indices of solids.
+pub(crate) const SOLID_IOR: (f32, f32) = (0.1, 10.0);
+
+/// Width of the microfacet distribution, constant or by place.
+pub(crate) struct Width {
+    pub alpha: f32,
+    /// Factor of √α, for which `alpha` is then 1.
+    pub texture: Option<TextureUse>,
+}
+
 /// Value over a surface.
 #[derive(Clone, Debug)]
 pub(crate) enum Value {

@@ -15,25 +15,13 @@ use crate::{
     coat::{LossyCoat, albedo_below_coat},
     error::Result,
     features,
-    import::media,
+    import::{COAT_IOR, SOLID_IOR, Width, media},
     material::{ConductorFresnel, Material, MaterialKind, Surface},
     math::colour::luminance,
-    texture::TextureUse,
 };
 
 /// Most models in one another; a model may name itself.
 const MAX_DEPTH: usize = 16;
-/// Index ratio below which a coat reflects next to nothing, and is left out.
-pub(super) const LEAST_COAT_IOR: f32 = 1.01;
-/// Refractive indices that a coat may have, and those of a dielectric.
-pub(super) const MAX_COAT_IOR: f32 = 4.0;
-const IOR_RANGE: (f32, f32) = (0.1, 10.0);
-
-pub(super) struct Width {
-    pub alpha: f32,
-    /// Factor of √α, for which `alpha` is then 1.
-    pub texture: Option<TextureUse>,
-}
 
 /// Material without a name as yet, whose back is black.
 fn one_sided(kind: MaterialKind) -> Material {
@@ -275,10 +263,10 @@ impl Reader {
         };
         let (int_ior, ext_ior) = (index("int_ior", inside)?, index("ext_ior", "air")?);
         let ior = int_ior / ext_ior;
-        if (IOR_RANGE.0..=IOR_RANGE.1).contains(&ior) {
+        if (SOLID_IOR.0..=SOLID_IOR.1).contains(&ior) {
             return Ok(ior);
         }
-        let (low, high) = IOR_RANGE;
+        let (low, high) = SOLID_IOR;
         Err(parameters.node.error(format!(
             "int_ior {int_ior} over ext_ior {ext_ior}: expected a ratio of {low} to {high}"
         )))
@@ -294,11 +282,13 @@ impl Reader {
             self.ignored.add(features::MI_SPECULAR, || node.place());
         }
         let is_nonlinear = parameters.boolean("nonlinear")?.unwrap_or(false);
-        if ior > MAX_COAT_IOR {
+        let (least, most) = COAT_IOR;
+        if ior > most {
             let message = format!("int_ior over ext_ior: expected at most 4, found {ior}");
             return Err(node.error(message));
         }
-        if ior < LEAST_COAT_IOR {
+        // Such a coat reflects next to nothing.
+        if ior < least {
             return Ok(colored(value, |reflectance| MaterialKind::Diffuse { reflectance }));
         }
         if let Some(width) = &width {

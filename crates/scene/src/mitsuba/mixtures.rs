@@ -3,12 +3,7 @@
 use glam::Vec3;
 
 use super::{
-    Reader,
-    bsdfs::{LEAST_COAT_IOR, MAX_COAT_IOR, Width, colored},
-    document::Node,
-    parameters::Parameters,
-    spectra::Role,
-    textures::Value,
+    Reader, bsdfs::colored, document::Node, parameters::Parameters, spectra::Role, textures::Value,
     values,
 };
 use crate::{
@@ -16,7 +11,7 @@ use crate::{
     error::Result,
     features,
     gloss::DIELECTRIC,
-    import::{self, blend::mixed},
+    import::{self, COAT_IOR, Width, blend::mixed},
     material::{Material, MaterialKind, Principled},
     math::colour::luminance,
 };
@@ -102,9 +97,7 @@ impl Reader {
         };
         let ior = self.ior(parameters, "bk7")?;
         match model.kind {
-            MaterialKind::Diffuse { reflectance }
-                if (LEAST_COAT_IOR..=MAX_COAT_IOR).contains(&ior) =>
-            {
+            MaterialKind::Diffuse { reflectance } if (COAT_IOR.0..=COAT_IOR.1).contains(&ior) => {
                 model.kind = MaterialKind::Plastic { diffuse: reflectance, alpha, ior };
                 model.surface.roughness = texture;
             }

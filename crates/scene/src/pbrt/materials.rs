@@ -13,10 +13,9 @@ use crate::{
     coat::albedo_below_coat,
     error::Result,
     features,
-    import::{Value, blend::mixed, media, relief::Reliefs},
+    import::{COAT_IOR, SOLID_IOR, Value, Width, blend::mixed, media, relief::Reliefs},
     material::{ConductorFresnel, Material, MaterialKind, Surface},
     measured::MeasuredFiles,
-    texture::TextureUse,
 };
 
 /// Most materials that may mix one another.
@@ -25,10 +24,6 @@ const MAX_DEPTH: usize = 16;
 const SMOOTH_ALPHA: f32 = 1e-3;
 /// Reflectance from which a smooth metal is a mirror; pbrt has none of more.
 const MIRROR_REFLECTANCE: f32 = 0.9999;
-/// Refractive indices that a coat may have.
-const COAT_IOR: (f32, f32) = (1.01, 4.0);
-/// Refractive indices of solids.
-const SOLID_IOR: (f32, f32) = (0.1, 10.0);
 
 pub(super) struct Materials<'a> {
     pub description: &'a Description,
@@ -37,13 +32,6 @@ pub(super) struct Materials<'a> {
     /// Mixtures around the material that is made.
     depth: usize,
     pub reliefs: Reliefs,
-}
-
-/// Width of the microfacet distribution, constant or by place.
-struct Roughness {
-    alpha: f32,
-    /// Factor of √α, for which `alpha` is then 1.
-    texture: Option<TextureUse>,
 }
 
 impl<'a> Materials<'a> {
@@ -280,7 +268,7 @@ impl<'a> Materials<'a> {
     }
 
     /// Width α from `roughness`, or `uroughness` and `vroughness`, and `remaproughness`.
-    fn roughness(&mut self, entity: &Entity, prefix: &str) -> Result<Roughness> {
+    fn roughness(&mut self, entity: &Entity, prefix: &str) -> Result<Width> {
         // α = √roughness unless the file says that it is α itself.
         let remaps = entity.boolean("remaproughness", true)?;
         let alpha_of = |roughness: f32| {
@@ -300,14 +288,14 @@ impl<'a> Materials<'a> {
                     self.textures.log.ignore(features::PBRT_ANISOTROPY, &entity.place);
                 }
                 let alpha = 0.5 * (alpha_of(u.x) + alpha_of(v.x));
-                Ok(Roughness { alpha: alpha.min(1.0), texture: None })
+                Ok(Width { alpha: alpha.min(1.0), texture: None })
             }
             (Value::Image(image), other) | (other, Value::Image(image)) => {
                 if !matches!(&other, Value::Image(same) if *same == image) {
                     self.textures.log.ignore(features::PBRT_ANISOTROPY, &entity.place);
                 }
                 let texture = map_numbers(&image, |roughness| alpha_of(roughness).min(1.0).sqrt());
-                Ok(Roughness { alpha: 1.0, texture: Some(texture) })
+                Ok(Width { alpha: 1.0, texture: Some(texture) })
             }
         }
     }

@@ -13,14 +13,13 @@ use crate::{
         ply::Attributes,
         subject::{Opacity, Subject, index_of},
     },
+    import::COAT_IOR,
     material::{ConductorFresnel, MaterialKind},
     texture::{Interpolation, TextureUse, Wrap},
 };
 
 /// Largest reflectance at normal incidence that pbrt finds an extinction coefficient for.
 const MAX_REFLECTANCE: f32 = 0.9999;
-/// Smallest index of a coat that is read back.
-const LEAST_COAT_IOR: f32 = 1.01;
 
 /// Directives of a material.
 #[derive(Debug)]
@@ -119,7 +118,8 @@ impl<'a> Translator<'a> {
                 if share >= 0.5 {
                     return self.metal(own.base_color, alpha);
                 }
-                let ior = index_of(own).max(LEAST_COAT_IOR);
+                // Smaller ones are not read back.
+                let ior = index_of(own).max(COAT_IOR.0);
                 self.coated(own.base_color, alpha, ior, "its dielectric")
             }
             MaterialKind::Mirror { reflectance } => self.metal(*reflectance, 0.0),
