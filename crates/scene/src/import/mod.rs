@@ -55,7 +55,7 @@ pub(crate) struct Width {
 }
 
 /// Value over a surface.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {
     /// The same everywhere; all three are equal for a number.
     Constant(Vec3),

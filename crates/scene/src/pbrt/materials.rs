@@ -282,18 +282,15 @@ impl<'a> Materials<'a> {
         let both = number("roughness")?.unwrap_or(Value::number(0.0));
         let along_u = number("uroughness")?.unwrap_or(both.clone());
         let along_v = number("vroughness")?.unwrap_or(both);
+        if along_u != along_v {
+            self.textures.log.ignore(features::PBRT_ANISOTROPY, &entity.place);
+        }
         match (along_u, along_v) {
             (Value::Constant(u), Value::Constant(v)) => {
-                if u != v {
-                    self.textures.log.ignore(features::PBRT_ANISOTROPY, &entity.place);
-                }
                 let alpha = 0.5 * (alpha_of(u.x) + alpha_of(v.x));
                 Ok(Width { alpha: alpha.min(1.0), texture: None })
             }
-            (Value::Image(image), other) | (other, Value::Image(image)) => {
-                if !matches!(&other, Value::Image(same) if *same == image) {
-                    self.textures.log.ignore(features::PBRT_ANISOTROPY, &entity.place);
-                }
+            (Value::Image(image), _) | (_, Value::Image(image)) => {
                 let texture = map_numbers(&image, |roughness| alpha_of(roughness).min(1.0).sqrt());
                 Ok(Width { alpha: 1.0, texture: Some(texture) })
             }
