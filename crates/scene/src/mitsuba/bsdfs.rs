@@ -344,11 +344,11 @@ impl Reader {
             }));
         };
         let (eta, k) = (eta.max(Vec3::splat(0.01)) / outside, k / outside);
+        let fresnel = ConductorFresnel::Exact { eta, k };
         if matches!(value, Value::Color(Vec3::ONE)) {
-            let fresnel = ConductorFresnel::Exact { eta, k };
             return Ok(one_sided(MaterialKind::Conductor { alpha: width, fresnel }));
         }
-        let normal = ((eta - 1.0) * (eta - 1.0) + k * k) / ((eta + 1.0) * (eta + 1.0) + k * k);
+        let normal = fresnel.at_normal_incidence();
         Ok(colored(value, |factor| MaterialKind::Conductor {
             alpha: width,
             fresnel: ConductorFresnel::Schlick { reflectance: factor * normal },

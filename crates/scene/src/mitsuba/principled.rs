@@ -8,6 +8,7 @@ use crate::{
     coat::{normal_reflectance, principled_base_factor},
     error::Result,
     features,
+    import::COAT_IOR,
     material::{Material, MaterialKind, Principled},
 };
 
@@ -58,13 +59,8 @@ impl Reader {
         }
         if share >= 0.5 && !is_metal {
             // The model's transmission is the root of the colour, since light goes in and out.
-            let transmittance = match base {
-                Value::Color(color) => color.map(f32::sqrt),
-                Value::Texture(_) | Value::Vertices(_) => {
-                    self.ignored.add(features::MI_SPECULAR_TEXTURE, || node.place());
-                    Vec3::ONE
-                }
-            };
+            let color = self.without_texture(Some(base), node, features::MI_SPECULAR_TEXTURE);
+            let transmittance = color.map_or(Vec3::ONE, |color| color.map(f32::sqrt));
             let (roughness, texture) = roughness.split();
             let alpha = (roughness.x * roughness.x).clamp(MIN_ALPHA, 1.0);
             let reflectance = Vec3::ONE;
@@ -83,7 +79,7 @@ impl Reader {
         let (metallic, metallic_texture) = metallic.split();
         let (roughness, roughness_texture) = roughness.split();
         // An index of 1 has no reflection at all, which the factor says better.
-        let (ior, specular) = if ior < 1.01 { (1.5, 0.0) } else { (ior, 1.0) };
+        let (ior, specular) = if ior < COAT_IOR.0 { (1.5, 0.0) } else { (ior, 1.0) };
         let mut model = colored(base, |base_color| {
             MaterialKind::Principled(Principled {
                 base_color,
