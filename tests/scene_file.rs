@@ -90,15 +90,22 @@ fn variants(all: &str, name: &str) -> Option<(Vec<String>, Option<String>)> {
     let body = between(all, &format!("enum {name} {{\n"), "\n}")?;
     let mut words = Vec::new();
     let (mut default, mut is_default) = (None, false);
+    // A name that an attribute gives, empty for none.
+    let mut given = None;
     for line in body.lines().map(str::trim) {
         if line == "#[default]" {
             is_default = true;
+        } else if line == "#[serde(skip)]" {
+            given = Some(String::new());
+        } else if let Some(name) = between(line, "#[serde(rename = \"", "\")]") {
+            given = Some(name.to_owned());
         } else if !line.starts_with("//") && !line.starts_with('#') {
-            let word = snake(line.trim_end_matches(','));
+            let word = given.take().unwrap_or_else(|| snake(line.trim_end_matches(',')));
             default = default.or(is_default.then(|| word.clone()));
             words.push(word);
         }
     }
+    words.retain(|word| !word.is_empty());
     Some((words, default))
 }
 

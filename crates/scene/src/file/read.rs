@@ -52,7 +52,7 @@ pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
 fn read_all<K, V>(
     entries: Vec<Spanned<DeValue>>,
     text: &str,
-    read: fn(Spanned<DeValue>) -> Result<(K, V), TextError>,
+    read: impl Fn(Spanned<DeValue>) -> Result<(K, V), TextError>,
 ) -> Result<Vec<Entry<K, V>>, TextError> {
     let read = |entry: Spanned<DeValue>| {
         let line = line_and_column(text, entry.span().start).0;
