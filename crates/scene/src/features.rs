@@ -119,8 +119,7 @@ features! {
     PBRT_COAT_ALBEDO "`albedo` of coats" "coats are clear";
     PBRT_ANISOTROPY "`uroughness` other than `vroughness`" "their mean α, or the texture";
     PBRT_TEXTURE "other textures, by name" "`fbm`, `marble`, `dots`, `ptex` and others are 0.5";
-    PBRT_TEXTURE_PRODUCT "products of two images" "the first counts";
-    PBRT_TEXTURE_MIX "mixtures of two images, or by an image" "the greater share counts";
+    PBRT_TEXTURE_MIX "`scale` and `mix` of images on other coordinates than the first" "their means count";
     PBRT_TEXTURE_WRAP "`wrap` other than `repeat` and `clamp`" "as `clamp`";
     PBRT_TEXTURE_MAPPING "`mapping` of textures other than `uv`" "as `uv`";
     PBRT_LIGHT_IMAGE "image of `goniometric` and `projection`"

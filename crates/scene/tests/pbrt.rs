@@ -420,6 +420,49 @@ fn images_are_scaled_inverted_mixed_and_placed() {
 }
 
 #[test]
+fn images_are_multiplied_and_mixed_texel_by_texel() {
+    let head = r#"Texture "a" "spectrum" "imagemap" "string filename" "a.png"
+        Texture "f" "float" "imagemap" "string filename" "a.png"
+        Texture "turned" "spectrum" "imagemap" "string filename" "a.png" "float uscale" -1"#;
+    let means = "ignored `scale` and `mix` of images on other coordinates than the first (line 4): their means \
+                 count";
+    // Red is opaque; blue is opaque by half.
+    let half = 128.0 / 255.0;
+    for (texture, expected, lost) in [
+        (
+            r#""scale" "texture tex" "a" "texture scale" "f""#,
+            [[1.0, 0.0, 0.0], [0.0, 0.0, half]],
+            None,
+        ),
+        (
+            r#""mix" "rgb tex1" [0 1 0] "texture tex2" "a" "texture amount" "f""#,
+            [[1.0, 0.0, 0.0], [0.0, 1.0 - half, half]],
+            None,
+        ),
+        (
+            r#""mix" "texture tex1" "a" "texture tex2" "turned" "float amount" 0.25"#,
+            [[0.875, 0.0, 0.125], [0.125, 0.0, 0.875]],
+            Some(means),
+        ),
+    ] {
+        let scene = textured(
+            &format!("{head}\nTexture \"t\" \"spectrum\" {texture}"),
+            r#""diffuse" "texture reflectance" "t""#,
+        );
+        let color = scene.materials[0].surface.color.as_ref().unwrap();
+        assert_eq!((color.encoding, color.channels), (Encoding::Linear, Channels::Color));
+        let Texels::Halves(texels) = &color.texture.texels else { panic!() };
+        for (texel, expected) in texels.iter().zip(expected) {
+            for (found, expected) in texel.iter().zip(expected) {
+                assert!((found.to_f32() - expected).abs() < 1e-3, "{texture}: {texels:?}");
+            }
+        }
+        let warnings = warnings(&scene);
+        assert_eq!(warnings.iter().find(|text| text.contains("mix")).map(|text| &text[..]), lost);
+    }
+}
+
+#[test]
 fn an_image_is_decoded_as_each_texture_says() {
     let folder = Folder::new();
     let grey = folder.path().join("a.png");

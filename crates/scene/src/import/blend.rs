@@ -98,10 +98,7 @@ fn blend_lobes(
     if own.opacity != other.opacity || own.vertex_color || other.vertex_color {
         return None;
     }
-    let share_image = match share {
-        Value::Image(image) => Some(image),
-        Value::Constant(_) => None,
-    };
+    let share_image = share.image();
     let [own_images, other_images] = [own, other]
         .map(|surface| [&surface.color, &surface.roughness, &surface.metallic].map(Option::as_ref));
     let all = || [share_image].into_iter().chain(own_images).chain(other_images);
@@ -114,17 +111,13 @@ fn blend_lobes(
         Some(used) => Value::Constant(used.mean().into()),
     };
     let share = share_image.map_or(share.clone(), |image| factor(Some(image)));
-    let at = |factor: &Value, index: usize| match factor {
-        Value::Constant(value) => *value,
-        Value::Image(used) => grid.texel(used, index).truncate(),
-    };
     let [own_factors, other_factors] = [own_images, other_images].map(|images| images.map(factor));
     let lobes = |kind: &MaterialKind, factors: &[Value; 3], index: usize| {
-        let [color, rough, metal] = factors.each_ref().map(|factor| at(factor, index));
+        let [color, rough, metal] = factors.each_ref().map(|factor| factor.at(&grid, index));
         Lobes::of(&kind.scaled(color, luminance(rough), luminance(metal))).unwrap_or_default()
     };
     let mixture = |index: usize| {
-        let share = luminance(at(&share, index)).clamp(0.0, 1.0);
+        let share = luminance(share.at(&grid, index)).clamp(0.0, 1.0);
         let pair = [lobes(first, &own_factors, index), lobes(second, &other_factors, index)];
         Lobes::mixed(pair, share)
     };

@@ -15,7 +15,10 @@ use crate::{
     features::{Feature, Ignored},
     file::CameraEntry,
     material::Material,
-    texture::TextureUse,
+    texture::{
+        TextureUse,
+        texelwise::{Texelwise, lie_alike},
+    },
 };
 
 /// Everything that a file of another format says.
@@ -77,6 +80,45 @@ impl Value {
 
     pub(crate) fn scaled(self, factor: f32) -> Self {
         self.affine(Vec3::splat(factor), Vec3::ZERO)
+    }
+
+    pub(crate) fn image(&self) -> Option<&TextureUse> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Image(image) => Some(image),
+        }
+    }
+
+    /// Value at a texel of a grid that the image, if it is one, lies on.
+    pub(crate) fn at(&self, grid: &Texelwise, index: usize) -> Vec3 {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Image(image) => grid.texel(image, index).truncate(),
+        }
+    }
+
+    /// Makes a value of others by `of`, texel by texel where any is an image. Images that do not lie as the
+    /// first of them count by their means, of which the second part tells.
+    pub(crate) fn combined<const N: usize>(
+        values: [Self; N],
+        of: impl Fn([Vec3; N]) -> Vec3 + Sync,
+    ) -> (Self, bool) {
+        let place = values.iter().find_map(Self::image).cloned();
+        let mut any_mean = false;
+        let values = values.map(|value| match value {
+            Self::Image(image) if place.as_ref().is_some_and(|place| !lie_alike(place, &image)) => {
+                any_mean = true;
+                Self::Constant(image.mean().into())
+            }
+            value => value,
+        });
+        let grid = Texelwise::of(&values.each_ref().map(Self::image));
+        let value = |index| of(values.each_ref().map(|value| value.at(&grid, index)));
+        let combined = match place {
+            Some(_) => Self::Image(grid.color(value)),
+            None => Self::Constant(value(0)),
+        };
+        (combined, any_mean)
     }
 }
 

@@ -1,5 +1,5 @@
-//! Textures of a scene description → constants and [`TextureUse`]s: every texture that is one image,
-//! scaled, inverted, mixed with constants or not.
+//! Textures of a scene description → constants and [`TextureUse`]s: images and what scales, inverts and
+//! mixes them.
 
 use std::{collections::HashMap, path::PathBuf, sync::Arc};
 
@@ -115,35 +115,30 @@ impl<'a> Textures<'a> {
                     (Value::Constant(factor), other) | (other, Value::Constant(factor)) => {
                         other.affine(factor, Vec3::ZERO)
                     }
-                    (first, _) => {
-                        self.log.ignore(features::PBRT_TEXTURE_PRODUCT, &entity.place);
-                        first
+                    (texture, scale) => {
+                        self.combined(entity, [texture, scale], |[texture, scale]| {
+                            texture * mean(scale)
+                        })
                     }
                 })
             }
             "mix" | "directionmix" => {
                 let (first, second) = (of(self, "tex1", 0.0)?, of(self, "tex2", 1.0)?);
-                let amount = match self.value(entity, "amount", true)? {
-                    Some(Value::Constant(amount)) => amount.x,
-                    Some(Value::Image(_)) => {
-                        self.log.ignore(features::PBRT_TEXTURE_MIX, &entity.place);
-                        0.5
-                    }
-                    None => 0.5,
-                };
+                let amount = self.value(entity, "amount", true)?.unwrap_or(Value::number(0.5));
                 if entity.name == "directionmix" {
                     self.log.ignore_named(features::PBRT_TEXTURE, "directionmix", &entity.place);
                 }
-                Ok(match (first, second) {
-                    (Value::Constant(constant), image) => {
-                        image.affine(Vec3::splat(amount), constant * (1.0 - amount))
+                Ok(match (first, second, amount) {
+                    (Value::Constant(constant), image, Value::Constant(amount)) => {
+                        image.affine(amount, constant * (1.0 - amount))
                     }
-                    (image, Value::Constant(constant)) => {
-                        image.affine(Vec3::splat(1.0 - amount), constant * amount)
+                    (image, Value::Constant(constant), Value::Constant(amount)) => {
+                        image.affine(1.0 - amount, constant * amount)
                     }
-                    (first, second) => {
-                        self.log.ignore(features::PBRT_TEXTURE_MIX, &entity.place);
-                        if amount <= 0.5 { first } else { second }
+                    (first, second, amount) => {
+                        self.combined(entity, [first, second, amount], |[first, second, amount]| {
+                            first.lerp(second, mean(amount))
+                        })
                     }
                 })
             }
@@ -167,6 +162,20 @@ impl<'a> Textures<'a> {
             }
             _ => Err(entity.error("expected a kind of texture that pbrt-v4 has")),
         }
+    }
+
+    /// Makes a value of others texel by texel.
+    fn combined<const N: usize>(
+        &mut self,
+        entity: &Entity,
+        values: [Value; N],
+        of: impl Fn([Vec3; N]) -> Vec3 + Sync,
+    ) -> Value {
+        let (value, any_mean) = Value::combined(values, of);
+        if any_mean {
+            self.log.ignore(features::PBRT_TEXTURE_MIX, &entity.place);
+        }
+        value
     }
 
     fn image(&mut self, entity: &Entity, is_number: bool) -> Result<Value> {
@@ -304,11 +313,16 @@ fn checkerboard(first: Vec3, second: Vec3, ([du, u], [dv, v]): Mapping) -> Textu
     }
 }
 
+/// Number of a colour, as pbrt takes that of an image.
+fn mean(color: Vec3) -> f32 {
+    color.element_sum() / 3.0
+}
+
 /// Makes a texture of numbers, `of` the numbers of another.
 pub(super) fn map_numbers(image: &TextureUse, of: impl Fn(f32) -> f32 + Sync) -> TextureUse {
     let has_color = image.channels == Channels::Color;
     let numbers = image.with_texels(|[red, green, blue, _]| {
-        [of(if has_color { (red + green + blue) / 3.0 } else { red }); 4]
+        [of(if has_color { mean(Vec3::new(red, green, blue)) } else { red }); 4]
     });
     TextureUse { channels: Channels::Red, ..numbers }
 }

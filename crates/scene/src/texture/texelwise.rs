@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{Vec2, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 use half::f16;
 use rayon::prelude::*;
 
@@ -47,6 +47,25 @@ impl Texelwise {
         used.value((Vec2::new(x as f32, y as f32) + 0.5) / size)
     }
 
+    fn indices(&self) -> impl IndexedParallelIterator<Item = usize> {
+        (0..self.width as usize * self.height as usize).into_par_iter()
+    }
+
+    fn image(&self, what: &str, texels: Texels) -> TextureUse {
+        let (width, height) = (self.width, self.height);
+        let name = self.first.as_ref().map_or("", |first| &first.texture.name);
+        let name = format!("{name}, {what}");
+        let texture = Arc::new(Texture { name, width, height, texels });
+        let place = self.first.clone().unwrap_or_else(|| TextureUse::new(Arc::clone(&texture)));
+        place.showing(texture)
+    }
+
+    /// Image of the colours that `of` gives for texels.
+    pub(crate) fn color(&self, of: impl Fn(usize) -> Vec3 + Sync) -> TextureUse {
+        let texel = |index| of(index).extend(1.0).to_array().map(f16::from_f32);
+        self.image("with others", Texels::Halves(self.indices().map(texel).collect()))
+    }
+
     /// Images of the base colour with its opacity, the roughness and the share of metal that `of` gives for
     /// texels.
     pub(crate) fn material(&self, of: impl Fn(usize) -> (Vec4, f32, f32) + Sync) -> Converted {
@@ -56,19 +75,10 @@ impl Texelwise {
             let base = base.to_array().map(f16::from_f32);
             (base, [0, byte(roughness), byte(metallic), u8::MAX])
         };
-        let count = self.width as usize * self.height as usize;
-        let (base, packed) = (0..count).into_par_iter().map(texel).unzip();
-        let image = |texels: Texels| {
-            let (width, height) = (self.width, self.height);
-            let name = self.first.as_ref().map(|first| first.texture.name.clone());
-            let name = format!("{}, as metallic-roughness", name.unwrap_or_default());
-            let texture = Arc::new(Texture { name, width, height, texels });
-            let place = self.first.clone().unwrap_or_else(|| TextureUse::new(Arc::clone(&texture)));
-            place.showing(texture)
-        };
-        let packed = image(Texels::Bytes(packed));
+        let (base, packed) = self.indices().map(texel).unzip();
+        let packed = self.image("as metallic-roughness", Texels::Bytes(packed));
         Converted {
-            base_color: image(Texels::Halves(base)),
+            base_color: self.image("as metallic-roughness", Texels::Halves(base)),
             roughness: TextureUse { channels: Channels::Green, ..packed.clone() },
             metallic: TextureUse { channels: Channels::Blue, ..packed },
         }
