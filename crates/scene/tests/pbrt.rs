@@ -424,8 +424,8 @@ fn images_are_multiplied_and_mixed_texel_by_texel() {
     let head = r#"Texture "a" "spectrum" "imagemap" "string filename" "a.png"
         Texture "f" "float" "imagemap" "string filename" "a.png"
         Texture "turned" "spectrum" "imagemap" "string filename" "a.png" "float uscale" -1"#;
-    let means = "ignored `scale` and `mix` of images on other coordinates than the first (line 4): their means \
-                 count";
+    let means = "ignored `scale` and `mix` of images on other coordinates than the first (line 4): \
+                 their means count";
     // Red is opaque; blue is opaque by half.
     let half = 128.0 / 255.0;
     for (texture, expected, lost) in [
