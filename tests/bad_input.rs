@@ -490,7 +490,6 @@ fn no_command_writes_over_what_it_reads() {
     let mut commands: Vec<Vec<&str>> = vec![
         vec!["fit", "env", "m.exr", "-o", "m.exr"],
         vec!["fit", "env", "scene.toml", "-o", "./scene.toml"],
-        vec!["fit", "table", "m.exr", "-o", "./m.exr"],
         vec!["study", "scene.toml", "-o", "report", "--reference=ours.exr"],
         vec!["study", "scene.toml", "-o", "report", "--reference=report"],
         vec!["export", "s.xml", "./s.xml", "--format=mitsuba"],

@@ -6,7 +6,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::support::command::{Folder, Run, pfm, program, words};
+use crate::support::command::{Folder, Run, pfm, program};
 
 /// Encodes a grey map of 16 × 8 texels, one of them bright.
 fn sky() -> Vec<u8> {
@@ -68,21 +68,6 @@ fn a_damaged_cache_is_a_warning() {
     let third = fit();
     third.assert(0, &["not a fit file", "made again"]);
     assert!(!third.output.contains("read from the cache"), "{}", third.output);
-}
-
-#[test]
-fn tables_list_every_fit() {
-    let folder = Folder::new();
-    folder.write("sky.pfm", sky());
-    let arguments = words(
-        "fit table sky.pfm diffuse:reflectance=0.5 --environment-lobes 2,4 --brdf-lobes 3 --views 4 \
-         --quiet -o table.md --pictures pictures",
-    );
-    folder.run(&arguments).assert(0, &[]);
-    let table = fs::read_to_string(folder.path().join("table.md")).unwrap();
-    assert_eq!(table.matches("| sky |").count(), 2, "{table}");
-    assert_eq!(table.matches("| diffuse:reflectance=0.5 | 3 × 4 |").count(), 1, "{table}");
-    assert_eq!(fs::read_dir(folder.path().join("pictures")).unwrap().count(), 3);
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! `fenestra fit`: fits environment maps and BRDFs with spherical radial basis functions.
 
 mod source;
-mod table;
 
 use std::path::{Path, PathBuf};
 
@@ -35,8 +34,6 @@ pub enum Target {
     Env(EnvironmentArguments),
     /// Fit BRDF × cosine at a series of view elevations.
     Brdf(BrdfArguments),
-    /// Fit many maps and BRDFs and write a Markdown table of errors and times.
-    Table(table::Arguments),
 }
 
 /// Options shared by both kinds of fit.
@@ -99,7 +96,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.target {
         Target::Env(arguments) => environment(arguments),
         Target::Brdf(arguments) => brdf(arguments),
-        Target::Table(arguments) => table::run(arguments),
     }
 }
 

@@ -32,7 +32,7 @@ pub(crate) struct Source {
 }
 
 /// Tests for the extension of a measured BRDF.
-pub(super) fn is_measured(path: &Path) -> bool {
+fn is_measured(path: &Path) -> bool {
     MEASURED.contains(&extension(path).as_str())
 }
 
