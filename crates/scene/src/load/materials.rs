@@ -10,166 +10,169 @@ use glam::Vec3;
 use super::{FINITE, Loader, MIN_ALPHA};
 use crate::{
     Scene,
-    error::Result,
+    error::{Error, Result},
     file::{MaterialEntry, MaterialKeys, MaterialKindEntry, TextureEntry, Textured},
+    import::COAT_IOR,
     material::{ConductorFresnel, Emission, Material, MaterialKind, Opacity, Principled, Surface},
     measured::MeasuredFiles,
     texture::{Encoding, Texture, TextureCache, TextureUse},
     transform::sine_cosine_deg,
 };
 
-/// Files that materials name, each loaded once.
-#[derive(Default)]
-struct Loaded {
-    textures: TextureCache,
-    measured: MeasuredFiles,
-    inputs: Vec<PathBuf>,
-    warnings: Vec<String>,
-}
-
 /// Value of a key without its texture, and the texture.
 type Value<T> = (T, Option<TextureUse>);
 
+/// Range of shares and reflectances.
+const SHARE: (f32, f32) = (0.0, 1.0);
+
 impl Loader<'_> {
     pub(super) fn materials(&self, entries: &[MaterialEntry], scene: &mut Scene) -> Result<()> {
-        let mut loaded = Loaded::default();
+        let mut textures = TextureCache::default();
         let mut paths = Vec::new();
         for name in entries.iter().flat_map(MaterialEntry::textures).map(|entry| &entry.texture) {
             let path = self.file(name);
             if let Some(image) = self.arrays.images.get(name) {
                 let label = path.display().to_string();
-                let texture = Texture::of_image(&label, image, &mut loaded.warnings)
+                let texture = Texture::of_image(&label, image, &mut scene.warnings)
                     .map_err(|message| self.error(format!("{}: {message}", name.display())))?;
-                loaded.textures.insert(&path, texture);
+                textures.insert(&path, texture);
             } else {
                 paths.push(path);
             }
         }
-        loaded.textures.load_all(paths, &mut loaded.warnings)?;
+        textures.load_all(paths, &mut scene.warnings)?;
+        let of_arrays: BTreeSet<_> =
+            self.arrays.images.keys().map(|name| self.file(name)).collect();
+        scene.inputs.extend(textures.files().difference(&of_arrays).cloned());
+        let mut reader = Reader {
+            loader: self,
+            textures,
+            measured: MeasuredFiles::default(),
+            inputs: &mut scene.inputs,
+            warnings: &mut scene.warnings,
+            label: String::new(),
+            surface: Surface::default(),
+        };
         let mut lines = HashMap::new();
         for entry in entries {
             let name = &entry.keys.name;
-            let label = format!("material `{name}` (line {})", entry.line);
+            reader.label = format!("material `{name}` (line {})", entry.line);
             if let Some(first) = lines.insert(name, entry.line) {
-                return Err(self
-                    .error(format!("{label}: the name is taken by the material of line {first}")));
+                let message = format!("the name is taken by the material of line {first}");
+                return Err(reader.error(&message));
             }
-            let mut surface = self.surface(&label, &entry.keys, &mut loaded)?;
-            let kind = self.material_kind(&label, &entry.kind, &mut surface, &mut loaded)?;
+            reader.read_surface(&entry.keys)?;
+            let kind = reader.kind(&entry.kind)?;
+            let surface = std::mem::take(&mut reader.surface);
             scene.materials.push(Material { name: name.clone(), kind, surface });
         }
-        let of_arrays: BTreeSet<_> =
-            self.arrays.images.keys().map(|name| self.file(name)).collect();
-        scene.inputs.extend(loaded.textures.files().difference(&of_arrays).cloned());
-        scene.inputs.append(&mut loaded.inputs);
-        scene.warnings.append(&mut loaded.warnings);
         Ok(())
+    }
+}
+
+/// Reader of entries, which loads each file once.
+struct Reader<'a> {
+    loader: &'a Loader<'a>,
+    textures: TextureCache,
+    measured: MeasuredFiles,
+    inputs: &'a mut Vec<PathBuf>,
+    warnings: &'a mut Vec<String>,
+    /// Name and line of the entry, for messages.
+    label: String,
+    /// Surface of the entry as far as it has been read.
+    surface: Surface,
+}
+
+impl Reader<'_> {
+    fn error(&self, message: &str) -> Error {
+        self.loader.error(format!("{}: {message}", self.label))
+    }
+
+    fn check(&self, holds: bool, message: &str) -> Result<()> {
+        if holds { Ok(()) } else { Err(self.error(message)) }
+    }
+
+    fn check_range(&self, key: &str, values: &[f32], range: (f32, f32)) -> Result<()> {
+        self.loader.check_range(&format!("{}: {key}", self.label), values, range)
+    }
+
+    fn vector(&self, key: &str, values: [f32; 3], range: (f32, f32)) -> Result<Vec3> {
+        self.check_range(key, &values, range)?;
+        Ok(Vec3::from_array(values))
     }
 
     /// Reads the keys that all types share.
-    fn surface(&self, label: &str, keys: &MaterialKeys, loaded: &mut Loaded) -> Result<Surface> {
-        let mut surface = Surface {
-            vertex_color: keys.vertex_color,
-            two_sided: keys.two_sided,
-            ..Surface::default()
-        };
+    fn read_surface(&mut self, keys: &MaterialKeys) -> Result<()> {
+        self.surface.vertex_color = keys.vertex_color;
+        self.surface.two_sided = keys.two_sided;
         if let Some(entry) = &keys.normal {
-            self.check(entry.factor.is_none(), || {
-                format!("{label}: normal: a normal map has a strength, found factor")
-            })?;
+            let message = "normal: a normal map has a strength, found factor";
+            self.check(entry.factor.is_none(), message)?;
             let strength = entry.strength.unwrap_or(1.0);
-            self.check_range(&format!("{label}: normal.strength"), &[strength], FINITE)?;
-            surface.normal =
-                Some(self.texture_use(label, "normal", entry, Encoding::Linear, loaded)?);
-            surface.normal_scale = strength;
+            self.check_range("normal.strength", &[strength], FINITE)?;
+            self.surface.normal = Some(self.texture_use("normal", entry, Encoding::Linear)?);
+            self.surface.normal_scale = strength;
         }
         if let Some(opacity) = &keys.opacity {
-            let (factor, texture) = self.number(label, "opacity", opacity, (0.0, 1.0), loaded)?;
-            surface.opacity = Opacity { factor, texture, cutoff: None };
+            let (factor, texture) = self.number("opacity", opacity, SHARE)?;
+            self.surface.opacity = Opacity { factor, texture, cutoff: None };
         }
         if let Some(cutoff) = keys.opacity_cutoff {
-            self.check_range(&format!("{label}: opacity_cutoff"), &[cutoff], (0.0, 1.0))?;
-            surface.opacity.cutoff = Some(cutoff);
+            self.check_range("opacity_cutoff", &[cutoff], SHARE)?;
+            self.surface.opacity.cutoff = Some(cutoff);
         }
         if let Some(emission) = &keys.emission {
-            let (radiance, texture) =
-                self.color(label, "emission", emission, (0.0, f32::MAX), loaded)?;
+            let (radiance, texture) = self.color("emission", emission, (0.0, f32::MAX))?;
             let two_sided = keys.emission_two_sided;
-            surface.emission = Some(Emission { radiance, texture, two_sided });
+            self.surface.emission = Some(Emission { radiance, texture, two_sided });
         }
-        self.check(keys.emission.is_some() || !keys.emission_two_sided, || {
-            format!("{label}: emission_two_sided needs emission")
-        })?;
-        Ok(surface)
+        let has_side = keys.emission.is_some() || !keys.emission_two_sided;
+        self.check(has_side, "emission_two_sided needs emission")
     }
 
-    fn material_kind(
-        &self,
-        label: &str,
-        kind: &MaterialKindEntry,
-        surface: &mut Surface,
-        loaded: &mut Loaded,
-    ) -> Result<MaterialKind> {
-        let mut share = |key: &str, value: &Textured<[f32; 3]>, surface: &mut Surface| {
-            let (color, texture) = self.color(label, key, value, (0.0, 1.0), loaded)?;
-            surface.color = texture;
-            Ok(color)
-        };
+    fn kind(&mut self, kind: &MaterialKindEntry) -> Result<MaterialKind> {
         Ok(match kind {
             MaterialKindEntry::Diffuse(entry) => MaterialKind::Diffuse {
-                reflectance: share("reflectance", &entry.reflectance, surface)?,
+                reflectance: self.share("reflectance", &entry.reflectance)?,
             },
-            MaterialKindEntry::Mirror(entry) => MaterialKind::Mirror {
-                reflectance: share("reflectance", &entry.reflectance, surface)?,
-            },
+            MaterialKindEntry::Mirror(entry) => {
+                MaterialKind::Mirror { reflectance: self.share("reflectance", &entry.reflectance)? }
+            }
             MaterialKindEntry::Plastic(entry) => {
-                self.check_range(&format!("{label}: ior"), &[entry.ior], (1.01, 4.0))?;
+                self.check_range("ior", &[entry.ior], COAT_IOR)?;
                 MaterialKind::Plastic {
-                    diffuse: share("diffuse", &entry.diffuse, surface)?,
-                    alpha: self.one_alpha(label, "plastic", entry.alpha, &entry.roughness)?,
+                    diffuse: self.share("diffuse", &entry.diffuse)?,
+                    alpha: self.alpha(Some("plastic"), entry.alpha, &entry.roughness)?,
                     ior: entry.ior,
                 }
             }
             MaterialKindEntry::Conductor(entry) => {
                 let fresnel = match (&entry.reflectance, entry.eta, entry.k) {
-                    (Some(value), None, None) => ConductorFresnel::Schlick {
-                        reflectance: share("reflectance", value, surface)?,
-                    },
+                    (Some(value), None, None) => {
+                        ConductorFresnel::Schlick { reflectance: self.share("reflectance", value)? }
+                    }
                     (None, Some(eta), Some(k)) => ConductorFresnel::Exact {
-                        eta: self.vector(&format!("{label}: eta"), eta, (0.01, 100.0))?,
-                        k: self.vector(&format!("{label}: k"), k, (0.0, 100.0))?,
+                        eta: self.vector("eta", eta, (0.01, 100.0))?,
+                        k: self.vector("k", k, (0.0, 100.0))?,
                     },
                     _ => {
-                        let expected = "a conductor needs either reflectance, or eta and k";
-                        return Err(self.error(format!("{label}: {expected}")));
+                        let message = "a conductor needs either reflectance, or eta and k";
+                        return Err(self.error(message));
                     }
                 };
-                let alpha = if let Some(value @ Textured::Texture(_)) = &entry.roughness {
-                    self.check(entry.alpha.is_none(), || {
-                        format!("{label}: expected exactly one of alpha and roughness, found both")
-                    })?;
-                    let range = (MIN_ALPHA.sqrt(), 1.0);
-                    let (roughness, texture) =
-                        self.number(label, "roughness", value, range, loaded)?;
-                    surface.roughness = texture;
-                    (roughness * roughness).max(MIN_ALPHA)
-                } else {
-                    self.one_alpha(label, "conductor", entry.alpha, &entry.roughness)?
-                };
+                let alpha = self.alpha(None, entry.alpha, &entry.roughness)?;
                 MaterialKind::Conductor { alpha, fresnel }
             }
             MaterialKindEntry::Principled(entry) => {
-                let base_color = share("base_color", &entry.base_color, surface)?;
-                self.check_range(&format!("{label}: ior"), &[entry.ior], (1.0, 4.0))?;
-                self.check_range(&format!("{label}: specular"), &[entry.specular], (0.0, 1.0))?;
-                let (what, factor) = (format!("{label}: specular_color"), (0.0, f32::MAX));
-                let specular_color = self.vector(&what, entry.specular_color, factor)?;
-                let (metallic, texture) =
-                    self.number(label, "metallic", &entry.metallic, (0.0, 1.0), loaded)?;
-                surface.metallic = texture;
-                let (roughness, texture) =
-                    self.number(label, "roughness", &entry.roughness, (0.0, 1.0), loaded)?;
-                surface.roughness = texture;
+                let base_color = self.share("base_color", &entry.base_color)?;
+                self.check_range("ior", &[entry.ior], (1.0, 4.0))?;
+                self.check_range("specular", &[entry.specular], SHARE)?;
+                let factor = (0.0, f32::MAX);
+                let specular_color = self.vector("specular_color", entry.specular_color, factor)?;
+                let (metallic, texture) = self.number("metallic", &entry.metallic, SHARE)?;
+                self.surface.metallic = texture;
+                let (roughness, texture) = self.number("roughness", &entry.roughness, SHARE)?;
+                self.surface.roughness = texture;
                 MaterialKind::Principled(Principled {
                     base_color,
                     metallic,
@@ -181,123 +184,114 @@ impl Loader<'_> {
             }
             MaterialKindEntry::Dielectric(entry) => {
                 let ior = entry.ior;
-                self.check_range(&format!("{label}: ior"), &[ior], (0.2, 5.0))?;
-                let what = format!("{label}: absorption");
-                let absorption = self.vector(&what, entry.absorption, (0.0, 1e6))?;
+                self.check_range("ior", &[ior], (0.2, 5.0))?;
+                let absorption = self.vector("absorption", entry.absorption, (0.0, 1e6))?;
                 let is_smooth = entry.alpha.unwrap_or(0.0) == 0.0 && entry.roughness.is_none();
                 let alpha = if is_smooth {
                     0.0
                 } else {
-                    self.check((ior - 1.0).abs() >= 0.01, || {
-                        format!(
-                            "{label}: ior: a rough dielectric of index {ior} bends no light; expected \
-                             an index at least 0.01 from 1, or no roughness"
-                        )
-                    })?;
-                    self.one_alpha(label, "dielectric", entry.alpha, &entry.roughness)?
+                    let message = format!(
+                        "ior: a rough dielectric of index {ior} bends no light; expected an index at \
+                         least 0.01 from 1, or no roughness"
+                    );
+                    self.check((ior - 1.0).abs() >= 0.01, &message)?;
+                    self.alpha(Some("dielectric"), entry.alpha, &entry.roughness)?
                 };
                 MaterialKind::Dielectric {
                     ior,
                     alpha,
-                    reflectance: self.share(label, "reflectance", entry.reflectance)?,
-                    transmittance: self.share(label, "transmittance", entry.transmittance)?,
+                    reflectance: self.vector("reflectance", entry.reflectance, SHARE)?,
+                    transmittance: self.vector("transmittance", entry.transmittance, SHARE)?,
                     absorption,
                 }
             }
             MaterialKindEntry::ThinDielectric(entry) => {
-                self.check_range(&format!("{label}: ior"), &[entry.ior], (1.0, 4.0))?;
+                self.check_range("ior", &[entry.ior], (1.0, 4.0))?;
                 MaterialKind::ThinDielectric {
                     ior: entry.ior,
-                    reflectance: self.share(label, "reflectance", entry.reflectance)?,
-                    transmittance: self.share(label, "transmittance", entry.transmittance)?,
+                    reflectance: self.vector("reflectance", entry.reflectance, SHARE)?,
+                    transmittance: self.vector("transmittance", entry.transmittance, SHARE)?,
                 }
             }
             MaterialKindEntry::Measured(entry) => {
-                let path = self.file(&entry.file);
-                let Loaded { measured, inputs, warnings, .. } = loaded;
-                let table = measured.table(&path, inputs, warnings)?;
+                let path = self.loader.file(&entry.file);
+                let table = self.measured.table(&path, self.inputs, self.warnings)?;
                 MaterialKind::Measured { path, table }
             }
         })
     }
 
-    /// Reads three numbers 0…1.
-    fn share(&self, label: &str, key: &str, share: [f32; 3]) -> Result<Vec3> {
-        self.vector(&format!("{label}: {key}"), share, (0.0, 1.0))
+    /// Reads the colour of the model, 0…1, whose texture is that of the surface.
+    fn share(&mut self, key: &str, value: &Textured<[f32; 3]>) -> Result<Vec3> {
+        let (color, texture) = self.color(key, value, SHARE)?;
+        self.surface.color = texture;
+        Ok(color)
     }
 
     /// Reads a colour or a texture of colours with its factor.
     fn color(
-        &self,
-        label: &str,
+        &mut self,
         key: &str,
         value: &Textured<[f32; 3]>,
         range: (f32, f32),
-        loaded: &mut Loaded,
     ) -> Result<Value<Vec3>> {
-        let (color, texture) = match value {
-            Textured::Uniform(color) => (*color, None),
-            Textured::Texture(entry) => {
-                let used = self.texture_use(label, key, entry, Encoding::Srgb, loaded)?;
-                (entry.factor.unwrap_or_default().0, Some(used))
-            }
+        let entry = match value {
+            Textured::Uniform(color) => return Ok((self.vector(key, *color, range)?, None)),
+            Textured::Texture(entry) => entry,
         };
-        let factor = if texture.is_some() { ".factor" } else { "" };
-        Ok((self.vector(&format!("{label}: {key}{factor}"), color, range)?, texture))
+        let used = self.texture_use(key, entry, Encoding::Srgb)?;
+        let factor = entry.factor.unwrap_or_default().0;
+        Ok((self.vector(&format!("{key}.factor"), factor, range)?, Some(used)))
     }
 
     /// Reads a number or a texture of numbers with its factor.
     fn number(
-        &self,
-        label: &str,
+        &mut self,
         key: &str,
         value: &Textured<f32>,
         range: (f32, f32),
-        loaded: &mut Loaded,
     ) -> Result<Value<f32>> {
         let entry = match value {
             Textured::Uniform(number) => {
-                self.check_range(&format!("{label}: {key}"), &[*number], range)?;
+                self.check_range(key, &[*number], range)?;
                 return Ok((*number, None));
             }
             Textured::Texture(entry) => entry,
         };
         let [factor, green, blue] = entry.factor.unwrap_or_default().0;
-        self.check_range(&format!("{label}: {key}.factor"), &[factor], range)?;
-        self.check(factor == green && green == blue, || {
-            format!("{label}: {key}.factor: expected one number, found {:?}", [factor, green, blue])
-        })?;
-        let used = self.texture_use(label, key, entry, Encoding::Linear, loaded)?;
-        Ok((factor, Some(used)))
+        self.check_range(&format!("{key}.factor"), &[factor], range)?;
+        let found = [factor, green, blue];
+        let message = format!("{key}.factor: expected one number, found {found:?}");
+        self.check(factor == green && green == blue, &message)?;
+        Ok((factor, Some(self.texture_use(key, entry, Encoding::Linear)?)))
     }
 
-    /// GGX width of a material whose roughness is the same everywhere.
-    fn one_alpha(
-        &self,
-        label: &str,
-        kind: &str,
+    /// Reads a GGX width. The tables of the kind `tabulated` are made for one roughness.
+    fn alpha(
+        &mut self,
+        tabulated: Option<&str>,
         alpha: Option<f32>,
         roughness: &Option<Textured<f32>>,
     ) -> Result<f32> {
-        match (alpha, roughness) {
-            (Some(alpha), None) => {
-                self.check_range(&format!("{label}: alpha"), &[alpha], (MIN_ALPHA, 1.0))?;
+        match (alpha, roughness, tabulated) {
+            (Some(alpha), None, _) => {
+                self.check_range("alpha", &[alpha], (MIN_ALPHA, 1.0))?;
                 Ok(alpha)
             }
-            (None, Some(Textured::Uniform(roughness))) => {
+            (None, Some(Textured::Texture(_)), Some(kind)) => Err(self.error(&format!(
+                "roughness: expected one number, found a texture; the tables of a {kind} are made for \
+                 one roughness: use type = \"principled\""
+            ))),
+            (None, Some(value), _) => {
                 let range = (MIN_ALPHA.sqrt(), 1.0);
-                self.check_range(&format!("{label}: roughness"), &[*roughness], range)?;
+                let (roughness, texture) = self.number("roughness", value, range)?;
+                self.surface.roughness = texture;
                 Ok((roughness * roughness).max(MIN_ALPHA))
             }
-            (None, Some(Textured::Texture(_))) => Err(self.error(format!(
-                "{label}: roughness: expected one number, found a texture; the tables of a {kind} are \
-                 made for one roughness: use type = \"principled\""
-            ))),
-            (alpha, _) => {
+            (alpha, ..) => {
                 let found = if alpha.is_some() { "both" } else { "neither" };
-                Err(self.error(format!(
-                    "{label}: expected exactly one of alpha and roughness, found {found}"
-                )))
+                let expected = "expected exactly one of alpha and roughness";
+                Err(self.error(&format!("{expected}, found {found}")))
             }
         }
     }
@@ -305,22 +299,19 @@ impl Loader<'_> {
     /// Places an image on a surface. Its factor belongs to the property, whose default encoding is
     /// `encoding`.
     fn texture_use(
-        &self,
-        label: &str,
+        &mut self,
         key: &str,
         entry: &TextureEntry,
         encoding: Encoding,
-        loaded: &mut Loaded,
     ) -> Result<TextureUse> {
-        self.check(key == "normal" || entry.strength.is_none(), || {
-            format!("{label}: {key}: strength is for `normal`; expected factor")
-        })?;
+        let message = format!("{key}: strength is for `normal`; expected factor");
+        self.check(key == "normal" || entry.strength.is_none(), &message)?;
         let limit = (-1e6, 1e6);
-        self.check_range(&format!("{label}: {key}.scale"), &entry.scale.0, limit)?;
-        self.check_range(&format!("{label}: {key}.offset"), &entry.offset, limit)?;
-        self.check_range(&format!("{label}: {key}.rotate_deg"), &[entry.rotate_deg], FINITE)?;
-        let path = self.file(&entry.texture);
-        let texture = loaded.textures.load(&path, &mut loaded.warnings)?;
+        self.check_range(&format!("{key}.scale"), &entry.scale.0, limit)?;
+        self.check_range(&format!("{key}.offset"), &entry.offset, limit)?;
+        self.check_range(&format!("{key}.rotate_deg"), &[entry.rotate_deg], FINITE)?;
+        let path = self.loader.file(&entry.texture);
+        let texture = self.textures.load(&path, self.warnings)?;
         Ok(TextureUse {
             channels: entry.channel.unwrap_or_default(),
             encoding: match entry.linear {
