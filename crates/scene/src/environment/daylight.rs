@@ -41,9 +41,7 @@ pub(crate) struct Daylight {
     pub turbidity: f32,
     /// Reflectance of the ground, which the sky shows.
     pub albedo: Vec3,
-    /// Factor of the sky.
     pub sky_scale: f32,
-    /// Factor of the sun.
     pub sun_scale: f32,
     /// Angular radius of the sun, radians; its irradiance stays.
     pub sun_radius_rad: f32,

@@ -57,7 +57,6 @@ impl Folder {
     }
 }
 
-/// Name of the file of the environment.
 pub(super) const ENVIRONMENT: &str = "environment.exr";
 
 /// Returns an identifier that all formats and file systems take: `m00_name`, other characters as `_`.

@@ -44,7 +44,6 @@ pub(super) enum Recipe {
     Cut { factor: f32, cutoff: f32 },
 }
 
-/// Image to write.
 #[derive(Clone, Debug, PartialEq)]
 struct Picture {
     used: TextureUse,
@@ -65,7 +64,6 @@ pub(super) struct Bitmap {
     pub(super) name: String,
     /// True for linear values.
     pub(super) is_raw: bool,
-    /// True if texels are not interpolated.
     pub(super) is_nearest: bool,
 }
 

@@ -44,7 +44,6 @@ pub(super) struct Triangles {
     pub(super) has_colors: bool,
     /// Some vertices have opacities that the surface shows and that are not 1.
     pub(super) has_transparency: bool,
-    /// Some vertices have tangents.
     pub(super) has_tangents: bool,
     /// Triangles whose bitangent is the normal × the tangent, and those with the opposite.
     pub(super) bitangents: [usize; 2],
@@ -91,7 +90,6 @@ impl Parts {
         self.0.iter().zip([false, true]).filter(|(part, _)| !part.triangles.is_empty())
     }
 
-    /// Collects the facts about triangles of a surface.
     pub(super) fn describe(&self, surface: &Surface) -> Triangles {
         let mut facts = Triangles::default();
         for (part, is_flat) in self.each() {

@@ -48,7 +48,6 @@ pub(super) fn read_root(text: &str) -> Result<SceneFile, TextError> {
     Ok(file)
 }
 
-/// Reads every entry of an array of tables.
 fn read_all<K, V>(
     entries: Vec<Spanned<DeValue>>,
     text: &str,

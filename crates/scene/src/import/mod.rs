@@ -26,18 +26,14 @@ use crate::{
 pub(crate) struct Imported {
     /// Viewer, before its numbers are checked.
     pub camera: CameraEntry,
-    /// Image plane.
     pub film: FilmSettings,
     /// Settings of the render.
     pub asked: Asked,
     /// Light from everywhere, black if the file has none; `None` for a format without.
     pub environment: Option<EnvironmentMap>,
-    /// Lights without a surface.
     pub lamps: Vec<Lamp>,
     pub materials: Vec<Material>,
-    /// All triangles.
     pub geometry: Geometry,
-    /// Names of variants of the materials.
     pub variants: Vec<String>,
     /// Files that were read, the file itself first.
     pub inputs: Vec<PathBuf>,

@@ -213,7 +213,6 @@ impl Loader<'_> {
         memory::check(asker, vertex_bytes.saturating_add(triangle_bytes)).map_err(Error::memory)
     }
 
-    /// Finds a material of the scene by its name.
     pub(super) fn material_index(
         &self,
         label: &str,

@@ -15,7 +15,6 @@ const EDGES: (f32, f32) = (1e-6, 1e6);
 const RIGHT_ANGLE: f32 = 1e-3;
 
 impl Loader<'_> {
-    /// Checks the portals of a scene file.
     pub(super) fn portals(&self, entries: &[Entry<PortalKeys>]) -> Result<Vec<Portal>> {
         self.check(entries.len() <= MAX_PORTALS, || {
             format!(

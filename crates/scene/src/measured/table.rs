@@ -20,11 +20,9 @@ use crate::measured::{
     tabulate::{EnergyLimit, SamplingRow, directional_albedo},
 };
 
-/// Bins of θ_h as an index.
+/// Bins of θ_h, θ_d and φ_d as indices.
 const THETA_HALF: usize = MEASURED_THETA_HALF_BINS as usize;
-/// Bins of θ_d as an index.
 pub(super) const THETA_DIFFERENCE: usize = MEASURED_THETA_DIFFERENCE_BINS as usize;
-/// Bins of φ_d as an index.
 pub(super) const PHI_DIFFERENCE: usize = MEASURED_PHI_DIFFERENCE_BINS as usize;
 /// Cells of the grid.
 pub const CELL_COUNT: usize = THETA_HALF * THETA_DIFFERENCE * PHI_DIFFERENCE;

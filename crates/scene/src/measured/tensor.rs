@@ -12,7 +12,6 @@ use crate::{
     files,
 };
 
-/// First bytes of the files.
 pub(super) const MAGIC: [u8; 12] = *b"tensor_file\0";
 /// Bytes before the fields.
 const HEADER_BYTES: usize = MAGIC.len() + 6;

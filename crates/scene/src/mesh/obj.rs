@@ -111,7 +111,6 @@ struct ObjReader {
     library_indices: HashMap<String, usize>,
     images: Images,
     ignored: Ignored,
-    /// Line of the first smoothing group.
     first_smoothing: Option<usize>,
 }
 

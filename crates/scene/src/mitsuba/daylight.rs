@@ -16,7 +16,6 @@ use crate::{
 };
 
 impl Reader {
-    /// Reads the emitter as a map.
     pub(super) fn daylight(&mut self, parameters: &Parameters<'_>) -> Result<EnvironmentMap> {
         let node = parameters.node;
         let is_old = node.version() < 2.0;
@@ -68,7 +67,6 @@ impl Reader {
     }
 }
 
-/// Date and place of the sun.
 fn moment(parameters: &Parameters<'_>) -> Result<Moment> {
     let number =
         |name: &str, default: f32| Ok(f64::from(parameters.float(name)?.unwrap_or(default)));

@@ -22,9 +22,7 @@ use crate::{
 const MAX_DEPTH: usize = 32;
 /// Most elements of all files together; a file may be included many times.
 const MAX_ELEMENTS: usize = 1 << 21;
-/// Most bytes of a file.
 const MAX_FILE_BYTES: u64 = 1 << 28;
-/// Most files that are included.
 const MAX_INCLUDES: usize = 256;
 /// Most characters of a value with its `$name` replaced: defaults may name each other.
 const MAX_VALUE: usize = 1 << 16;

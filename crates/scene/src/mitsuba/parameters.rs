@@ -17,7 +17,6 @@ use crate::{
 /// Child elements of a plugin.
 #[derive(Debug)]
 pub(super) struct Parameters<'a> {
-    /// The plugin.
     pub node: Node<'a>,
     used: RefCell<Vec<usize>>,
 }

@@ -18,7 +18,6 @@ use crate::{
     spectrum::{self, Samples},
 };
 
-/// Most numbers of a spectrum.
 const MAX_NUMBERS: usize = 1 << 14;
 /// Meaning of a spectrum, on which its colour depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -10,7 +10,6 @@ use crate::{
     strands::{Basis, Detail},
 };
 
-/// Start of the binary files of `hair`.
 const BINARY_HAIR: &[u8] = b"BINARY_HAIR";
 
 impl Reader {

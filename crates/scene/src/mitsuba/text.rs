@@ -8,7 +8,6 @@ use crate::error::{Error, Result};
 pub(super) struct Lines(Vec<usize>);
 
 impl Lines {
-    /// Finds the lines of a text.
     pub(super) fn new(text: &str) -> Self {
         Self(text.match_indices('\n').map(|(at, _)| at + 1).collect())
     }

@@ -56,7 +56,6 @@ impl Value {
         }
     }
 
-    /// Tests for the colours of vertices.
     pub(super) fn is_of_vertices(&self) -> bool {
         matches!(self, Self::Vertices(_))
     }

@@ -28,7 +28,6 @@ pub(super) struct Shape {
     pub material: MaterialChoice,
     /// `AreaLightSource`, if the shape emits.
     pub light: Option<Rc<Entity>>,
-    /// Name of the medium inside.
     pub interior: Option<String>,
 }
 
@@ -74,7 +73,6 @@ pub(super) struct Description {
     pub lights: Vec<(Entity, DMat4)>,
 }
 
-/// Reader of directives.
 pub(super) struct Reader<'a> {
     source: Source,
     states: States,

@@ -348,7 +348,6 @@ impl<'a> Materials<'a> {
     }
 }
 
-/// Makes a number the opacity of a surface.
 pub(super) fn set_opacity(surface: &mut Surface, value: Value) {
     match value {
         Value::Constant(opacity) => surface.opacity.factor = opacity.x.clamp(0.0, 1.0),

@@ -318,7 +318,6 @@ impl Builder<'_> {
         )))
     }
 
-    /// Appends a mesh to the geometry.
     fn place(&mut self, mesh: &Mesh, material: u32, shape: &Shape, outer: DMat4) -> Result<()> {
         let placed = self.view.mirror * outer * shape.world_from_shape;
         let Some(transform) = Transform::from_matrix(placed) else {

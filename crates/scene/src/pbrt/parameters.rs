@@ -71,7 +71,6 @@ impl Kind {
 pub(super) enum Values {
     Numbers(Vec<f64>),
     Texts(Vec<String>),
-    /// Truth values.
     Booleans(Vec<bool>),
 }
 
@@ -85,7 +84,6 @@ impl Values {
     }
 }
 
-/// Parameter of a directive.
 #[derive(Clone, Debug)]
 pub(super) struct Parameter {
     pub kind: Kind,
@@ -231,11 +229,9 @@ fn push_value(
 /// Directive with a type and parameters: `Shape "sphere" "float radius" 2`.
 #[derive(Clone, Debug)]
 pub(super) struct Entity {
-    /// Directive.
     pub directive: &'static str,
     /// Type, such as `sphere`; the name for directives that name something.
     pub name: String,
-    /// Place of the directive.
     pub place: Place,
     parameters: Vec<Parameter>,
     /// Parameters from here on come from an `Attribute` directive.
@@ -264,7 +260,6 @@ impl Entity {
         format!("{} \"{}\"", self.directive, self.name)
     }
 
-    /// Makes an error of the directive's place.
     pub(super) fn error(&self, message: impl AsRef<str>) -> crate::error::Error {
         self.place.error(format!("{}: {}", self.label(), message.as_ref()))
     }

@@ -78,7 +78,6 @@ pub(super) struct State {
     pub area_light: Option<Rc<Entity>>,
     /// Name of the medium inside shapes, from `MediumInterface`.
     pub interior: Option<String>,
-    /// Parameters from `Attribute`.
     pub attributes: Attributes,
 }
 

@@ -10,7 +10,6 @@ const MAX_LENGTH: usize = 1 << 16;
 /// Place in a file; line and column count from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Place {
-    /// File.
     pub path: Rc<Path>,
     pub line: usize,
     /// Column in bytes.
@@ -18,7 +17,6 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// Makes an error of this place.
     pub(super) fn error(&self, message: impl Into<String>) -> Error {
         Error::parse(&self.path, self.line, self.column, message)
     }

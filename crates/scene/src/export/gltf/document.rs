@@ -26,7 +26,6 @@ const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 const NEAREST: u32 = 9728;
 const LINEAR: u32 = 9729;
 
-/// Textures with their images and samplers.
 #[derive(Debug, Default)]
 pub(super) struct Textures {
     sheets: Vec<Sheet>,
@@ -102,7 +101,6 @@ fn transform([[a, b, u], [c, d, v]]: [[f32; 3]; 2]) -> (Option<Value>, bool) {
     (Some(value), shear.abs() <= 1e-5 * scale_v.abs().max(scale_u))
 }
 
-/// Buffer with its views and accessors.
 #[derive(Debug, Default)]
 pub(super) struct Buffer {
     pub(super) bytes: Vec<u8>,

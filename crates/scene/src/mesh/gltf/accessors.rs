@@ -152,7 +152,6 @@ impl<'a> GltfReader<'a> {
         }))
     }
 
-    /// Returns the bytes of a buffer view.
     pub(super) fn view_bytes(&self, view: &View) -> Result<&[u8]> {
         let buffer = &self.buffers[view.buffer().index()];
         view.offset()

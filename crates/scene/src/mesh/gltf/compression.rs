@@ -108,7 +108,6 @@ struct Expansion<'a> {
 }
 
 impl Expansion<'_> {
-    /// Adds a buffer of `bytes`.
     fn push(&mut self, bytes: Vec<u8>) -> Result<Index<Buffer>, String> {
         let buffer = part(json!({"byteLength": bytes.len()}))?;
         self.buffers.push(bytes);
@@ -238,7 +237,6 @@ fn undecodable(error: impl std::fmt::Debug) -> String {
     format!("cannot be decoded: {error:?}")
 }
 
-/// Applies a filter to elements of a type.
 fn filtered<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
     bytes: &[u8],
     filter: impl Fn(&mut [T]),

@@ -33,7 +33,6 @@ use crate::{
     texture::Texture,
 };
 
-/// Bytes of the header of a GLB container.
 const GLB_HEADER_BYTES: usize = 12;
 
 /// Reads a glTF file with its buffers and images; `warnings` counts the parts that are left out. With a
