@@ -32,9 +32,6 @@ pub(super) struct View {
 /// pbrt looks along +z with +x to the right and +y up, so that a camera without a mirror shows a
 /// left-handed world. The renderer is right-handed. If the camera does not mirror already, the whole
 /// world is mirrored in z, and the picture is the same.
-///
-/// # Errors
-/// With the place for cameras that cannot be used and numbers out of range.
 pub(super) fn view(description: &Description, main: &Path, log: &mut Log) -> Result<View> {
     let (film, mut exposure, aspect) = film(description, log)?;
     let Some((entity, camera_from_world)) = &description.camera else {

@@ -86,9 +86,6 @@ pub(super) struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// Reads all directives of the main file `main`, whose names of files start in `folder`.
-    ///
-    /// # Errors
-    /// [`Parse`](crate::error::Error::Parse) with the place, and errors of the files.
     pub(super) fn read(main: &'a Path, folder: Folder) -> Result<(Description, Folder, Log<'a>)> {
         let mut reader = Self {
             source: Source::open(main, folder)?,

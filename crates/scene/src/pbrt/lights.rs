@@ -47,9 +47,6 @@ fn color(entity: &Entity, name: &str, textures: &Textures) -> Result<Vec3> {
 }
 
 /// Reads the emission of a shape with this area, in the units of the scene.
-///
-/// # Errors
-/// With the place for other kinds of lights.
 pub(super) fn area_light(
     entity: &Entity,
     area: f64,
@@ -82,10 +79,6 @@ pub(super) fn area_light(
 
 impl Lights {
     /// Adds a light. `world_from_light` leads to the renderer's world.
-    ///
-    /// # Errors
-    /// With the place for kinds that pbrt does not have, transformations that flatten, and maps that
-    /// cannot be read.
     pub(super) fn add(
         &mut self,
         entity: &Entity,

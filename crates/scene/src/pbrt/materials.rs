@@ -46,9 +46,6 @@ impl<'a> Materials<'a> {
     }
 
     /// Makes the material that a shape takes; none for a surface that is not there.
-    ///
-    /// # Errors
-    /// With the place for unknown names and kinds, and parameters of the wrong type.
     pub(super) fn make(&mut self, choice: &MaterialChoice) -> Result<Option<Material>> {
         match choice {
             MaterialChoice::Default => {

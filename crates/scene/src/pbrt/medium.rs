@@ -8,9 +8,6 @@ use crate::{error::Result, features, material::MaterialKind};
 impl Materials<'_> {
     /// Lets a dielectric absorb as the medium inside it does; names a medium that does more, or that
     /// another surface bounds.
-    ///
-    /// # Errors
-    /// With the place for an unknown medium, and parameters of the wrong type.
     pub(super) fn fill(
         &mut self,
         kind: Option<&mut MaterialKind>,

@@ -2,7 +2,8 @@
 //!
 //! bytes → `tokens` → `parameters` → `directives`, with the `state` in force → shapes,
 //! materials, textures and lights. The format is that of <https://pbrt.org/fileformat-v4>; details that
-//! it leaves open follow pbrt-v4's source. Paths are relative to the folder of the main file.
+//! it leaves open follow pbrt-v4's source. Paths are relative to the folder of the main file. Errors
+//! carry the place of the directive, parameter or token at fault.
 //!
 //! The side of a surface from which light leaves, and behind which the inside of a dielectric lies, is
 //! that of its normal: of the vertex normals where a mesh has some, else of its winding; turned by

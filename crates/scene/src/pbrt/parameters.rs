@@ -270,9 +270,6 @@ impl Entity {
     }
 
     /// Parameter with this name, which must be of one of these types.
-    ///
-    /// # Errors
-    /// With the place for another type.
     pub(super) fn find_of(&self, name: &str, kinds: &[Kind]) -> Result<Option<&Parameter>> {
         let Some(found) = self.find(name) else { return Ok(None) };
         if kinds.contains(&found.kind) {
@@ -336,9 +333,6 @@ impl Entity {
 }
 
 /// Reads parameters up to the next word.
-///
-/// # Errors
-/// As [`Entity::read`].
 pub(super) fn read_parameters(source: &mut Source) -> Result<Vec<Parameter>> {
     let mut parameters: Vec<Parameter> = Vec::new();
     loop {

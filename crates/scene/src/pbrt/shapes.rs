@@ -21,9 +21,6 @@ use crate::{
 const PATCH_CELLS: u32 = 16;
 
 /// Makes the mesh of a shape.
-///
-/// # Errors
-/// With the place for parameters that are no shape, and files that cannot be read.
 pub(super) fn mesh(
     entity: &Entity,
     folder: &Folder,

@@ -59,9 +59,6 @@ impl Source {
     }
 
     /// Next token, or the end of an imported file or of everything.
-    ///
-    /// # Errors
-    /// Those of the tokeniser.
     pub(super) fn next(&mut self) -> Result<Part> {
         if let Some(token) = self.held.take() {
             return Ok(Part::Token(token));
@@ -86,9 +83,6 @@ impl Source {
     }
 
     /// Next token of the file in hand; none at its end, which stays to be read by `next`.
-    ///
-    /// # Errors
-    /// Those of the tokeniser.
     pub(super) fn next_here(&mut self) -> Result<Option<Token>> {
         match (self.held.take(), self.stack.last_mut()) {
             (None, Some(open)) => open.tokens.next(),

@@ -73,9 +73,6 @@ fn unknown(parameter: &Parameter, expected: &str) -> crate::error::Error {
 }
 
 /// Reflectance, 0…1.
-///
-/// # Errors
-/// With the place for lists that are no spectrum and unknown names.
 pub(super) fn reflectance(parameter: &Parameter, folder: &Folder, log: &mut Log) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,
@@ -91,9 +88,6 @@ pub(super) fn reflectance(parameter: &Parameter, folder: &Folder, log: &mut Log)
 }
 
 /// Colour of a light; that of `rgb` as given, others with luminance 1.
-///
-/// # Errors
-/// As [`reflectance`].
 pub(super) fn light(parameter: &Parameter, folder: &Folder) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,
@@ -106,9 +100,6 @@ pub(super) fn light(parameter: &Parameter, folder: &Folder) -> Result<Vec3> {
 }
 
 /// Refractive index or extinction coefficient.
-///
-/// # Errors
-/// As [`reflectance`].
 pub(super) fn index(parameter: &Parameter, folder: &Folder) -> Result<Vec3> {
     let color = match source(parameter, folder)? {
         Source::Color(color) => color,

@@ -43,9 +43,6 @@ impl Attributes {
     }
 
     /// Adds parameters, which come before older ones of the same name.
-    ///
-    /// # Errors
-    /// With the place for an unknown target.
     pub(super) fn add(
         &mut self,
         target: &str,
@@ -103,9 +100,6 @@ pub(super) struct States {
 
 impl States {
     /// Saves the state.
-    ///
-    /// # Errors
-    /// With the place if too many are saved.
     pub(super) fn save(&mut self, why: Saved, place: Place) -> Result<()> {
         if self.saved.len() == MAX_SAVED {
             let message = format!("more than {MAX_SAVED} blocks in one another");
@@ -116,9 +110,6 @@ impl States {
     }
 
     /// Returns to the state saved last.
-    ///
-    /// # Errors
-    /// With the place if it was saved for another reason, or not at all.
     pub(super) fn restore(&mut self, why: Saved, place: &Place) -> Result<()> {
         match self.saved.pop() {
             Some((found, state, _)) if found == why => {
@@ -138,9 +129,6 @@ impl States {
     }
 
     /// Checks that everything has ended.
-    ///
-    /// # Errors
-    /// With the place of the beginning.
     pub(super) fn check_end(&self) -> Result<()> {
         match self.saved.last() {
             Some((why, _, place)) => {

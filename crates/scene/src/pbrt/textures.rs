@@ -44,17 +44,11 @@ impl<'a> Textures<'a> {
     }
 
     /// Spectrum of a parameter, constant or textured, if it is given.
-    ///
-    /// # Errors
-    /// With the place for unknown names, other types and images that cannot be read.
     pub(super) fn spectrum(&mut self, entity: &Entity, name: &str) -> Result<Option<Value>> {
         self.value(entity, name, false)
     }
 
     /// Number of a parameter, constant or textured, if it is given.
-    ///
-    /// # Errors
-    /// As [`Textures::spectrum`].
     pub(super) fn number(&mut self, entity: &Entity, name: &str) -> Result<Option<Value>> {
         self.value(entity, name, true)
     }
@@ -242,9 +236,6 @@ impl<'a> Textures<'a> {
     }
 
     /// Normal map that a material names, if it does.
-    ///
-    /// # Errors
-    /// With the place for an image that cannot be read.
     pub(super) fn normal_map(&mut self, entity: &Entity) -> Result<Option<TextureUse>> {
         let Some(file) = entity.string("normalmap")? else { return Ok(None) };
         let texture = self.load(entity, file, None)?;
@@ -253,9 +244,6 @@ impl<'a> Textures<'a> {
     }
 
     /// Image of the radiance of an area light, if it names one: shown once, (0, 0) at its lower left.
-    ///
-    /// # Errors
-    /// With the place for an image that cannot be read.
     pub(super) fn light_image(&mut self, entity: &Entity) -> Result<Option<TextureUse>> {
         let Some(file) = entity.string("filename")? else { return Ok(None) };
         let texture = self.load(entity, file, None)?;
