@@ -419,7 +419,7 @@ fn squared_error_works_for_materials() {
 #[test]
 fn real_maps_reach_their_quality() {
     for path in shared("scenes/env", &["hdr"]).iter().chain(&shared("data/env", &["hdr"])) {
-        let target = EnvironmentMap::load(path, 1.0, 0.0, &mut Vec::new()).unwrap();
+        let target = EnvironmentMap::load(path, 1.0, &mut Vec::new()).unwrap();
         let is_uffizi = path.to_string_lossy().contains("uffizi");
         let mut last = f64::INFINITY;
         for (lobes, limit) in [(25, 10.0), (50, 10.0), (100, 0.25)] {

@@ -203,7 +203,7 @@ fn describe(summary: &ChannelSummary) -> String {
 
 fn environment_map(path: &Path) -> Result<Description> {
     let mut warnings = Vec::new();
-    let map = EnvironmentMap::load(path, 1.0, 0.0, &mut warnings)?;
+    let map = EnvironmentMap::load(path, 1.0, &mut warnings)?;
     let mut lines = vec![format!("environment map of {}x{} texels", map.width, map.height)];
     let mut channels = serde_json::Map::new();
     for (index, name) in ["R", "G", "B"].into_iter().enumerate() {

@@ -170,7 +170,7 @@ impl<'a> Product<'a> {
 #[test]
 fn means_are_those_of_the_map() {
     let parameters = CourtParameters { width: 128, ..CourtParameters::default() };
-    let map = EnvironmentMap::court(&parameters, 1.0, 30.0).unwrap();
+    let map = EnvironmentMap::court(&parameters, 1.0).unwrap().turned(30.0);
     let tree = Tree::new(&map);
     assert_eq!((tree.depth, tree.nodes.len()), (7, first_of_level(7)));
     let total = EnvironmentTables::new(&map).total;

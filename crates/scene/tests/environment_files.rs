@@ -26,7 +26,7 @@ fn texels() -> Vec<Vec3> {
 /// Loads a map with its warnings.
 fn load(path: &Path) -> (EnvironmentMap, Vec<String>) {
     let mut warnings = Vec::new();
-    let map = EnvironmentMap::load(path, 1.0, 0.0, &mut warnings).unwrap();
+    let map = EnvironmentMap::load(path, 1.0, &mut warnings).unwrap();
     (map, warnings)
 }
 
@@ -34,7 +34,7 @@ fn load(path: &Path) -> (EnvironmentMap, Vec<String>) {
 fn refusal(path: &Path) -> String {
     let mut warnings = Vec::new();
     let message =
-        EnvironmentMap::load(path, 1.0, 0.0, &mut warnings).expect_err("is refused").to_string();
+        EnvironmentMap::load(path, 1.0, &mut warnings).expect_err("is refused").to_string();
     assert!(message.starts_with(&path.display().to_string()), "{message}");
     message
 }
@@ -129,14 +129,12 @@ fn grey_files_give_grey_maps() {
 fn scale_and_rotation_are_applied() {
     let folder = Folder::new();
     let path = folder.write("map.hdr", hdr_bytes(8, 4, &texels()));
-    let map = EnvironmentMap::load(&path, 2.5, -270.0, &mut Vec::new()).unwrap();
+    let map = EnvironmentMap::load(&path, 2.5, &mut Vec::new()).unwrap().turned(-270.0);
     assert_eq!(map.texels[3], texel(3) * 2.5);
     assert!((map.rotation_rad - std::f32::consts::FRAC_PI_2).abs() < 1e-6);
-    for (scale, rotation_deg, word) in
-        [(-1.0, 0.0, "scale"), (f32::NAN, 0.0, "scale"), (1.0, f32::INFINITY, "rotation_deg")]
-    {
-        let error = EnvironmentMap::load(&path, scale, rotation_deg, &mut Vec::new());
-        assert!(error.unwrap_err().to_string().contains(word));
+    for scale in [-1.0, f32::NAN] {
+        let error = EnvironmentMap::load(&path, scale, &mut Vec::new());
+        assert!(error.unwrap_err().to_string().contains("scale"));
     }
 }
 
@@ -249,7 +247,7 @@ fn a_file_with_flipped_bytes_never_panics() {
             damaged[position] ^= 0xff;
             let path = folder.write(name, &damaged);
             // Either outcome is fine, but a map that loads must hold radiance.
-            if let Ok(map) = EnvironmentMap::load(&path, 1.0, 0.0, &mut Vec::new()) {
+            if let Ok(map) = EnvironmentMap::load(&path, 1.0, &mut Vec::new()) {
                 assert!(map.texels.iter().all(|t| t.is_finite() && t.min_element() >= 0.0));
             }
         }
@@ -304,7 +302,7 @@ fn the_sun_stands_where_it_should_with_the_power_it_should() {
                 horizon: [0.0; 3],
                 ground: [0.0; 3],
             };
-            let map = EnvironmentMap::sky(&parameters, 1.0, 0.0).unwrap();
+            let map = EnvironmentMap::sky(&parameters, 1.0).unwrap();
             // 90° clockwise from −Z is +X.
             let sun = Vec3::new(0.866_025_4, 0.5, 0.0);
             let reach = (radius_deg + 2.0 * 360.0 / width as f32).to_radians().cos();
@@ -319,13 +317,13 @@ fn the_sun_stands_where_it_should_with_the_power_it_should() {
 
 #[test]
 fn procedural_maps_are_lit_as_their_names_say() {
-    let sky = EnvironmentMap::sky(&SkyParameters::default(), 1.0, 0.0).unwrap();
+    let sky = EnvironmentMap::sky(&SkyParameters::default(), 1.0).unwrap();
     let brightest = sky.texels.iter().map(|texel| luminance(*texel)).fold(0.0, f32::max);
     assert!(brightest > 1e4, "{brightest}");
     let horizon = sky.radiance(Vec3::new(-1.0, 0.02, 0.0).normalize());
     assert!(luminance(horizon) > luminance(sky.radiance(Vec3::Y)));
 
-    let court = EnvironmentMap::court(&CourtParameters::default(), 1.0, 0.0).unwrap();
+    let court = EnvironmentMap::court(&CourtParameters::default(), 1.0).unwrap();
     assert_eq!((court.width, court.height), (1024, 512));
     let (up, wall) = (court.radiance(Vec3::Y), court.radiance(Vec3::new(1.0, 0.3, 0.2)));
     assert!(luminance(up) > 10.0 * luminance(wall));
@@ -334,11 +332,11 @@ fn procedural_maps_are_lit_as_their_names_say() {
     let glints = court.texels.iter().filter(|texel| texel.x > 30.0).count();
     assert!(glints > 20, "{glints} texels of glinting windows");
     assert!(court.texels.iter().all(|texel| texel.is_finite() && texel.min_element() > 0.0));
-    let again = EnvironmentMap::court(&CourtParameters::default(), 1.0, 0.0).unwrap();
+    let again = EnvironmentMap::court(&CourtParameters::default(), 1.0).unwrap();
     assert_eq!(court.texels, again.texels);
     let other = CourtParameters { seed: 2, ..CourtParameters::default() };
-    assert_ne!(court.texels, EnvironmentMap::court(&other, 1.0, 0.0).unwrap().texels);
-    let scaled = EnvironmentMap::court(&CourtParameters::default(), 2.0, 90.0).unwrap();
+    assert_ne!(court.texels, EnvironmentMap::court(&other, 1.0).unwrap().texels);
+    let scaled = EnvironmentMap::court(&CourtParameters::default(), 2.0).unwrap().turned(90.0);
     assert_eq!(scaled.texels[1000], court.texels[1000] * 2.0);
     let turned = scaled.radiance(-Vec3::X).distance(2.0 * court.radiance(-Vec3::Z));
     assert!(turned < 1e-3, "{turned}");
@@ -347,8 +345,8 @@ fn procedural_maps_are_lit_as_their_names_say() {
 #[test]
 fn parameters_out_of_range_are_refused_by_name() {
     type Made = Result<EnvironmentMap, String>;
-    fn made<P: serde::de::DeserializeOwned>(text: &str, make: fn(&P, f32, f32) -> Made) -> Made {
-        make(&toml::from_str(text).map_err(|error| error.to_string())?, 1.0, 0.0)
+    fn made<P: serde::de::DeserializeOwned>(text: &str, make: fn(&P, f32) -> Made) -> Made {
+        make(&toml::from_str(text).map_err(|error| error.to_string())?, 1.0)
     }
     let sky = |text| made(text, EnvironmentMap::sky);
     let court = |text| made(text, EnvironmentMap::court);

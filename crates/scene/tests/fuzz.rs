@@ -32,7 +32,7 @@ fn mesh(path: &Path, _: &[u8]) -> bool {
 
 fn map(path: &Path, bytes: &[u8]) -> bool {
     let texture = Texture::decode("map", bytes, &mut Vec::new());
-    EnvironmentMap::load(path, 1.0, 0.0, &mut Vec::new()).is_ok() || texture.is_ok()
+    EnvironmentMap::load(path, 1.0, &mut Vec::new()).is_ok() || texture.is_ok()
 }
 
 fn picture(_: &Path, bytes: &[u8]) -> bool {
@@ -40,7 +40,7 @@ fn picture(_: &Path, bytes: &[u8]) -> bool {
 }
 
 fn image(path: &Path, _: &[u8]) -> bool {
-    let is_map = EnvironmentMap::load(path, 1.0, 0.0, &mut Vec::new()).is_ok();
+    let is_map = EnvironmentMap::load(path, 1.0, &mut Vec::new()).is_ok();
     Image::read_exr(path).is_ok() | is_map
 }
 

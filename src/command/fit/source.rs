@@ -57,7 +57,7 @@ pub(super) fn environment(path: &Path) -> Result<(EnvironmentMap, String, Vec<Pa
         return Ok((scene.environment, format!("{}_environment", scene.name), scene.inputs));
     }
     let mut warnings = Vec::new();
-    let map = EnvironmentMap::load(path, 1.0, 0.0, &mut warnings)?;
+    let map = EnvironmentMap::load(path, 1.0, &mut warnings)?;
     warn(&warnings);
     Ok((map, stem(path), vec![path.into()]))
 }

@@ -5,7 +5,6 @@ use serde::Deserialize;
 
 use super::{
     EnvironmentMap,
-    load::check_placement,
     procedural::{check_radiance, check_range, check_width, render},
 };
 use crate::math::random::random_independent_1d;
@@ -61,16 +60,11 @@ impl Default for CourtParameters {
 }
 
 impl EnvironmentMap {
-    /// Renders the map of `parameters`, radiance times `scale`, rotated by `rotation_deg`.
+    /// Renders the map of `parameters`, radiance times `scale`.
     ///
     /// # Errors
     /// Returns a message that names the parameter, its value and the allowed range.
-    pub fn court(
-        parameters: &CourtParameters,
-        scale: f32,
-        rotation_deg: f32,
-    ) -> Result<Self, String> {
-        check_placement(scale, rotation_deg)?;
+    pub fn court(parameters: &CourtParameters, scale: f32) -> Result<Self, String> {
         check_width(parameters.width)?;
         check_radiance("glint", parameters.glint, scale)?;
         check_radiance("sky", parameters.sky, scale)?;
@@ -85,7 +79,7 @@ impl EnvironmentMap {
         check_range("window_spacing", parameters.window_spacing, 0.5, parameters.court_width)?;
         check_range("glint_share", parameters.glint_share, 0.0, 1.0)?;
         let texels = render(parameters.width, 3, |direction| court_radiance(parameters, direction));
-        Ok(Self::procedural("court", parameters.width, texels, scale, rotation_deg))
+        Ok(Self::procedural("court", parameters.width, texels, scale))
     }
 }
 

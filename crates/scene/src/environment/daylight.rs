@@ -127,8 +127,8 @@ impl Daylight {
         of(turbidity).lerp(of(turbidity + 1), hazier).max(Vec3::ZERO)
     }
 
-    /// Renders the map, radiance times `scale`, rotated by `rotation_deg`; black if the sun is down.
-    pub(crate) fn map(&self, scale: f32, rotation_deg: f32) -> EnvironmentMap {
+    /// Renders the map, radiance times `scale`; black if the sun is down.
+    pub(crate) fn map(&self, scale: f32) -> EnvironmentMap {
         let mut texels = vec![Vec3::ZERO; (WIDTH * (WIDTH / 2)) as usize];
         if self.sun_elevation() >= 0.0 {
             let channels = self.channels();
@@ -146,7 +146,7 @@ impl Daylight {
             let disc = self.sun_scale * self.sun_irradiance() / solid_angle;
             add_disc(&mut texels, WIDTH, self.sun, self.sun_radius_rad, disc);
         }
-        EnvironmentMap::procedural("daylight", WIDTH, texels, scale, rotation_deg)
+        EnvironmentMap::procedural("daylight", WIDTH, texels, scale)
     }
 }
 
@@ -208,7 +208,7 @@ mod tests {
     fn the_map_has_the_irradiance_of_sky_and_sun() {
         let mut light = daylight(Vec3::new(0.3, 0.5, 0.6), 3.7);
         light.sky_scale = 0.0;
-        let map = light.map(1.0, 0.0);
+        let map = light.map(1.0);
         let (width, height) = (map.width as usize, map.height as usize);
         let edge = |row: usize| (PI * row as f32 / height as f32).cos();
         let row = |row: usize| {
@@ -217,6 +217,6 @@ mod tests {
         };
         let found: Vec3 = (0..height).map(row).sum();
         assert!(found.abs_diff_eq(light.sun_irradiance(), 1e-3), "{found}");
-        assert!(daylight(-Vec3::Z, 3.0).map(1.0, 0.0).is_black());
+        assert!(daylight(-Vec3::Z, 3.0).map(1.0).is_black());
     }
 }

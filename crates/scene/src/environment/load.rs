@@ -29,21 +29,17 @@ type Image = ([u32; 2], Vec<Vec3>);
 impl EnvironmentMap {
     /// Reads a lat-long map in the format of its extension: `.hdr`, `.exr` or `.pfm`.
     ///
-    /// Multiplies radiance by `scale` and rotates the map by `rotation_deg` about +Y,
-    /// counter-clockwise seen from above. Sets texels with a negative, infinite or NaN component to
-    /// 0 and counts them in a warning. Warns of a ratio other than 2:1.
+    /// Multiplies radiance by `scale`. Sets texels with a negative, infinite or NaN component to 0 and
+    /// counts them in a warning. Warns of a ratio other than 2:1.
     ///
     /// # Errors
     /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it is truncated, of another
     /// format, of an absurd size or without the channels R, G, B or Y.
-    pub fn load(
-        path: &Path,
-        scale: f32,
-        rotation_deg: f32,
-        warnings: &mut Vec<String>,
-    ) -> Result<Self> {
-        check_placement(scale, rotation_deg).map_err(|message| Error::format(path, message))?;
-        Ok(Self::read(path, scale, warnings)?.placed(rotation_deg, warnings))
+    pub fn load(path: &Path, scale: f32, warnings: &mut Vec<String>) -> Result<Self> {
+        check_scale(scale).map_err(|message| Error::format(path, message))?;
+        let map = Self::read(path, scale, warnings)?;
+        map.check_ratio(warnings);
+        Ok(map)
     }
 
     /// As [`EnvironmentMap::load`], from an image in memory; `name` serves messages.
@@ -54,10 +50,9 @@ impl EnvironmentMap {
         name: &str,
         image: &RgbImage,
         scale: f32,
-        rotation_deg: f32,
         warnings: &mut Vec<String>,
     ) -> Result<Self, String> {
-        check_placement(scale, rotation_deg)?;
+        check_scale(scale)?;
         let RgbImage { width, height, ref pixels } = *image;
         check_size(width.into(), height.into())?;
         if pixels.len() != width as usize * height as usize {
@@ -65,11 +60,12 @@ impl EnvironmentMap {
         }
         let texels = pixels.iter().map(|pixel| Vec3::from(*pixel)).collect();
         let map = Self::cleaned(name.to_owned(), ([width, height], texels), scale, warnings);
-        Ok(map.placed(rotation_deg, warnings))
+        map.check_ratio(warnings);
+        Ok(map)
     }
 
-    /// Turns a lat-long map, and warns of a ratio other than 2:1.
-    fn placed(mut self, rotation_deg: f32, warnings: &mut Vec<String>) -> Self {
+    /// Warns of a ratio other than 2:1.
+    fn check_ratio(&self, warnings: &mut Vec<String>) {
         if self.width != 2 * self.height {
             warnings.push(format!(
                 "{}: {}×{} texels; a lat-long map is expected to be twice as wide as high and is \
@@ -77,11 +73,9 @@ impl EnvironmentMap {
                 self.source, self.width, self.height
             ));
         }
-        self.rotation_rad = rotation_deg.rem_euclid(360.0).to_radians();
-        self
     }
 
-    /// As [`EnvironmentMap::load`] without a rotation, for an image of any ratio and mapping.
+    /// As [`EnvironmentMap::load`], for an image of any ratio and mapping.
     ///
     /// # Errors
     /// As [`EnvironmentMap::load`].
@@ -126,13 +120,10 @@ impl EnvironmentMap {
     }
 }
 
-/// Rejects a scale that is negative or not finite and a rotation that is not finite.
-pub(super) fn check_placement(scale: f32, rotation_deg: f32) -> Result<(), String> {
+/// Rejects a scale that is negative or not finite.
+fn check_scale(scale: f32) -> Result<(), String> {
     if !(scale.is_finite() && scale >= 0.0) {
         return Err(format!("scale = {scale}; expected a finite number, 0 or more"));
-    }
-    if !rotation_deg.is_finite() {
-        return Err(format!("rotation_deg = {rotation_deg}; expected a finite number"));
     }
     Ok(())
 }

@@ -83,6 +83,11 @@ impl EnvironmentMap {
         })
     }
 
+    /// The same map with another rotation about +Y, degrees, counter-clockwise seen from above.
+    pub fn turned(self, rotation_deg: f32) -> Self {
+        Self { rotation_rad: rotation_deg.rem_euclid(360.0).to_radians(), ..self }
+    }
+
     /// Rotates a direction from the world into the frame of the map.
     fn map_from_world(&self, direction: Vec3) -> Vec3 {
         let (s, c) = self.rotation_rad.sin_cos();

@@ -3,9 +3,7 @@
 use glam::{DVec3, Vec3};
 use serde::Deserialize;
 
-use super::{
-    Daylight, EnvironmentMap, SUN_RADIUS_DEG, load::check_placement, procedural::check_range,
-};
+use super::{Daylight, EnvironmentMap, SUN_RADIUS_DEG, procedural::check_range};
 
 /// Earth's radius over its distance from the sun, which is the sun's parallax.
 const PARALLAX: f64 = 6371.01 / 149_597_890.0;
@@ -98,16 +96,11 @@ impl Default for DaylightParameters {
 }
 
 impl EnvironmentMap {
-    /// Renders daylight \[Hosek & Wilkie 2012, 2013\], radiance times `scale`, rotated by `rotation_deg`.
+    /// Renders daylight \[Hosek & Wilkie 2012, 2013\], radiance times `scale`.
     ///
     /// # Errors
     /// Returns a message that names the parameter, its value and the allowed range.
-    pub fn daylight(
-        parameters: &DaylightParameters,
-        scale: f32,
-        rotation_deg: f32,
-    ) -> Result<Self, String> {
-        check_placement(scale, rotation_deg)?;
+    pub fn daylight(parameters: &DaylightParameters, scale: f32) -> Result<Self, String> {
         let DaylightParameters { turbidity, albedo, hour, timezone, place, sun_scale, .. } =
             *parameters;
         let [year, month, day] = parameters.date.map(i64::from);
@@ -146,6 +139,6 @@ impl EnvironmentMap {
             sun_scale,
             sun_radius_rad: SUN_RADIUS_DEG.to_radians(),
         };
-        Ok(daylight.map(scale, rotation_deg))
+        Ok(daylight.map(scale))
     }
 }

@@ -8,21 +8,9 @@ use crate::math::frame::direction_from_lat_long;
 
 impl EnvironmentMap {
     /// Builds the map named `source` from its texels before scaling.
-    pub(super) fn procedural(
-        source: &str,
-        width: u32,
-        mut texels: Vec<Vec3>,
-        scale: f32,
-        rotation_deg: f32,
-    ) -> Self {
+    pub(super) fn procedural(source: &str, width: u32, mut texels: Vec<Vec3>, scale: f32) -> Self {
         texels.par_iter_mut().for_each(|texel| *texel *= scale);
-        Self {
-            width,
-            height: width / 2,
-            texels,
-            rotation_rad: rotation_deg.rem_euclid(360.0).to_radians(),
-            source: source.into(),
-        }
+        Self { width, height: width / 2, texels, rotation_rad: 0.0, source: source.into() }
     }
 }
 

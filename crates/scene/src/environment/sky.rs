@@ -6,7 +6,6 @@ use serde::Deserialize;
 
 use super::{
     EnvironmentMap,
-    load::check_placement,
     procedural::{check_radiance, check_range, check_width, render, texel_direction},
 };
 use crate::math::frame::{lat_long_from_direction, sin_cos_pi};
@@ -52,15 +51,14 @@ impl Default for SkyParameters {
 const SUN_GRID: usize = 16;
 
 impl EnvironmentMap {
-    /// Renders the map of `parameters`, radiance times `scale`, rotated by `rotation_deg`.
+    /// Renders the map of `parameters`, radiance times `scale`.
     ///
     /// The sun's texels hold the power of its disc at any resolution: a texel larger than the disc
     /// is darker than `sun_radiance`.
     ///
     /// # Errors
     /// Returns a message that names the parameter, its value and the allowed range.
-    pub fn sky(parameters: &SkyParameters, scale: f32, rotation_deg: f32) -> Result<Self, String> {
-        check_placement(scale, rotation_deg)?;
+    pub fn sky(parameters: &SkyParameters, scale: f32) -> Result<Self, String> {
         let SkyParameters { sun_elevation_deg, sun_azimuth_deg, sun_radius_deg, .. } = *parameters;
         check_width(parameters.width)?;
         check_radiance("zenith", parameters.zenith, scale)?;
@@ -85,7 +83,7 @@ impl EnvironmentMap {
             sun_radius_deg.to_radians(),
             parameters.sun_radiance.into(),
         );
-        Ok(Self::procedural("sky", width, texels, scale, rotation_deg))
+        Ok(Self::procedural("sky", width, texels, scale))
     }
 }
 

@@ -43,7 +43,7 @@ impl Loader<'_> {
         scene.environment = match (&self.options.environment, imported.environment) {
             (Some(map), _) => {
                 scene.inputs.push(map.clone());
-                EnvironmentMap::load(map, 1.0, 0.0, &mut scene.warnings)?
+                EnvironmentMap::load(map, 1.0, &mut scene.warnings)?
             }
             (None, Some(environment)) => environment,
             (None, None) => {
@@ -55,7 +55,7 @@ impl Loader<'_> {
             }
         };
         if let Some(rotation_deg) = self.options.rotation_deg {
-            scene.environment.rotation_rad = rotation_deg.rem_euclid(360.0).to_radians();
+            scene.environment = scene.environment.turned(rotation_deg);
         }
         Ok(self.finished(scene))
     }

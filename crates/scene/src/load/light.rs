@@ -24,7 +24,9 @@ impl Loader<'_> {
         if let Some(map) = &self.options.environment {
             scene.inputs.push(map.clone());
             let rotation_deg = rotation_deg.unwrap_or(0.0);
-            scene.environment = EnvironmentMap::load(map, 1.0, rotation_deg, &mut scene.warnings)?;
+            self.check_range("environment.rotation_deg", &[rotation_deg], FINITE)?;
+            let map = EnvironmentMap::load(map, 1.0, &mut scene.warnings)?;
+            scene.environment = map.turned(rotation_deg);
         } else if let Some(entry) = &file.environment {
             let mut entry = entry.clone();
             let is_file = |map: &&PathBuf| !self.arrays.images.contains_key(*map);
@@ -61,24 +63,25 @@ impl Loader<'_> {
                  {found}"
             )));
         };
+        let error = |message: String| self.error(format!("environment.{name}: {message}"));
         let made = if let Some(map) = &entry.map {
             let Some(image) = self.arrays.images.get(map) else {
-                return EnvironmentMap::load(&self.file(map), scale, rotation_deg, warnings);
+                let map = EnvironmentMap::load(&self.file(map), scale, warnings)?;
+                return Ok(map.turned(rotation_deg));
             };
-            let name = map.display().to_string();
-            EnvironmentMap::of_image(&name, image, scale, rotation_deg, warnings)
+            EnvironmentMap::of_image(&map.display().to_string(), image, scale, warnings)
         } else if let Some(court) = &entry.court {
-            EnvironmentMap::court(court, scale, rotation_deg)
+            EnvironmentMap::court(court, scale)
         } else if let Some(sky) = &entry.sky {
-            EnvironmentMap::sky(sky, scale, rotation_deg)
+            EnvironmentMap::sky(sky, scale)
         } else if let Some(daylight) = &entry.daylight {
-            EnvironmentMap::daylight(daylight, scale, rotation_deg)
+            EnvironmentMap::daylight(daylight, scale)
         } else {
             let constant = entry.constant.unwrap_or_default();
             let constant = self.vector("environment.constant", constant, (0.0, f32::MAX))?;
-            EnvironmentMap::constant(constant, scale)
+            return EnvironmentMap::constant(constant, scale).map_err(error);
         };
-        made.map_err(|message| self.error(format!("environment.{name}: {message}")))
+        made.map(|map| map.turned(rotation_deg)).map_err(error)
     }
 
     fn lamp(&self, index: usize, entry: &LampEntry) -> Result<Lamp> {

@@ -63,7 +63,7 @@ impl Reader {
             sun_scale: if node.kind() == "sky" { 0.0 } else { sun_scale },
             sun_radius_rad: (0.5 * aperture).to_radians(),
         };
-        Ok(daylight.map(1.0, 0.0))
+        Ok(daylight.map(1.0))
     }
 }
 

@@ -28,7 +28,7 @@ pub(super) fn load(
     warnings: &mut Vec<String>,
 ) -> Result<Option<EnvironmentMap>> {
     let mut own = Vec::new();
-    let mut map = EnvironmentMap::load(path, scale, 0.0, &mut own)?;
+    let mut map = EnvironmentMap::load(path, scale, &mut own)?;
     if let Some(texels) = halved(&map) {
         map.texels = texels;
         map.height /= 2;
