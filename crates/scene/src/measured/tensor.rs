@@ -121,9 +121,7 @@ fn fields(bytes: &[u8]) -> std::result::Result<BTreeMap<String, Field>, String> 
         at = range.end;
         Ok(range)
     };
-    let number = |range: Range<usize>| {
-        bytes[range].iter().rev().fold(0_u64, |value, &byte| value << 8 | u64::from(byte))
-    };
+    let number = |range: Range<usize>| files::little_endian(&bytes[range]);
     let version = [number(take(1)?), number(take(1)?)];
     if version[0] != 1 {
         let [major, minor] = version;

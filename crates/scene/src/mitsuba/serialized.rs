@@ -9,7 +9,7 @@ use flate2::read::ZlibDecoder;
 
 use crate::{
     error::{Error, Result},
-    files,
+    files::{self, little_endian},
     mesh::Mesh,
 };
 
@@ -65,11 +65,6 @@ fn parse(bytes: &[u8], index: usize) -> Result<(Mesh, bool), String> {
         return Err(format!("mesh {index} does not begin where the file says"));
     };
     Stream::new(mesh).mesh(version)
-}
-
-/// Number of at most eight bytes.
-fn little_endian(bytes: &[u8]) -> u64 {
-    bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
 }
 
 /// Numbers of a zlib stream, with a bound on what it can hold.

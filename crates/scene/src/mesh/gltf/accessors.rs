@@ -8,6 +8,7 @@ use gltf::{
 use super::GltfReader;
 use crate::{
     error::{Error, Result},
+    files::little_endian,
     memory,
 };
 
@@ -67,7 +68,7 @@ impl<'a> GltfReader<'a> {
                 accessor.index()
             )));
         }
-        let indices = self.elements(accessor, unsigned)?;
+        let indices = self.elements(accessor, |bytes| little_endian(bytes) as u32)?;
         match indices.iter().position(|&index| index as usize >= vertex_count) {
             Some(element) => Err(self.error(format!(
                 "accessor {}, element {element} (triangle {}): vertex index {} is out of range, \
@@ -114,7 +115,7 @@ impl<'a> GltfReader<'a> {
             let places = self.slices(&label, &indices.view(), from, count, index_size)?;
             let new = self.slices(&label, &values.view(), values.offset(), count, size)?;
             for (place, value) in places.zip(new) {
-                let place = unsigned(place) as usize;
+                let place = little_endian(place) as usize;
                 *elements.get_mut(place).ok_or_else(|| {
                     self.error(format!("{label}: sparse index {place} is out of range"))
                 })? = element(value);
@@ -167,9 +168,4 @@ impl<'a> GltfReader<'a> {
                 ))
             })
     }
-}
-
-/// Unsigned number of up to four bytes.
-fn unsigned(bytes: &[u8]) -> u32 {
-    bytes.iter().rev().fold(0, |sum, &byte| sum << 8 | u32::from(byte))
 }
