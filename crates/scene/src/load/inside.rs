@@ -50,7 +50,7 @@ struct Sight {
 /// Finds a view of a room from inside; none for a scene that is no room.
 pub(super) fn view(geometry: &Geometry, low: Vec3, high: Vec3) -> Option<View> {
     let grid = Grid::new(geometry, low, high)?;
-    let places: Vec<IVec3> = grid.places().collect();
+    let places: Vec<IVec3> = places(IVec3::ZERO, grid.size - 1).collect();
     let inside: Vec<IVec3> =
         places.into_par_iter().filter(|&place| grid.is_inside(place)).collect();
     let is_room = inside.len() as f32 > ROOM_SHARE * grid.cells.len() as f32;
@@ -74,6 +74,14 @@ pub(super) fn view(geometry: &Geometry, low: Vec3, high: Vec3) -> Option<View> {
     let from = grid.center(place) - ahead * back * grid.cell;
     let length = (sights[best].cells + back) * grid.cell;
     Some(View { from, at: from + length * (ahead - TILT * Vec3::Y) })
+}
+
+/// Cells from a first to a last one, both included.
+fn places(first: IVec3, last: IVec3) -> impl Iterator<Item = IVec3> {
+    (first.z..=last.z).flat_map(move |z| {
+        let row = move |y| (first.x..=last.x).map(move |x| IVec3::new(x, y, z));
+        (first.y..=last.y).flat_map(row)
+    })
 }
 
 /// Horizontal direction by its number.
@@ -108,20 +116,14 @@ impl Grid {
         let first = self.place(a.min(b).min(c));
         let last = self.place(a.max(b).max(c));
         let reach = 0.5 * self.cell * normal.abs().element_sum();
-        let mut touched = Vec::new();
-        for z in first.z..=last.z {
-            for y in first.y..=last.y {
-                for x in first.x..=last.x {
-                    let place = IVec3::new(x, y, z);
-                    let offset = self.center(place) - a;
-                    if offset.dot(normal).abs() <= reach && self.covers([a, b, c], normal, place) {
-                        touched.push(self.index(place));
-                    }
-                }
-            }
-        }
+        let is_touched = |place: &IVec3| {
+            let offset = self.center(*place) - a;
+            offset.dot(normal).abs() <= reach && self.covers([a, b, c], normal, *place)
+        };
+        let touched: Vec<IVec3> = places(first, last).filter(is_touched).collect();
         let share = 0.5 * across / touched.len().max(1) as f32;
-        for index in touched {
+        for place in touched {
+            let index = self.index(place);
             self.cells[index].0 += share;
             self.cells[index].1 += share.length();
         }
@@ -148,13 +150,6 @@ impl Grid {
 
     fn index(&self, place: IVec3) -> usize {
         ((place.z * self.size.y + place.y) * self.size.x + place.x) as usize
-    }
-
-    fn places(&self) -> impl Iterator<Item = IVec3> + use<> {
-        let size = self.size;
-        (0..size.z).flat_map(move |z| {
-            (0..size.y).flat_map(move |y| (0..size.x).map(move |x| IVec3::new(x, y, z)))
-        })
     }
 
     /// Way from a cell to the next surface.
