@@ -28,15 +28,8 @@ pub(super) struct Lights {
     pub lamps: Vec<Lamp>,
     /// Radiance from everywhere.
     constant: Vec3,
-    maps: Vec<SquareMap>,
-}
-
-/// Equal-area map as the file gives it.
-struct SquareMap {
-    texels: Vec<Vec3>,
-    side: u32,
-    light_from_world: DMat3,
-    source: String,
+    /// Equal-area maps as the files give them, and light from world.
+    maps: Vec<(EnvironmentMap, DMat3)>,
 }
 
 fn color(entity: &Entity, name: &str, textures: &Textures) -> Result<Vec3> {
@@ -208,12 +201,7 @@ impl Lights {
         let factor = scale
             * illuminance.map_or(1.0, |wanted| wanted / upper_illuminance(&map.texels, map.width));
         map.texels.iter_mut().for_each(|texel| *texel *= factor as f32 * exposure);
-        self.maps.push(SquareMap {
-            texels: map.texels,
-            side: map.width,
-            light_from_world,
-            source: path.display().to_string(),
-        });
+        self.maps.push((map, light_from_world));
         textures.log.inputs.push(path);
         Ok(())
     }
@@ -224,12 +212,11 @@ impl Lights {
     /// A message for radiance that is not finite or negative.
     pub(super) fn environment(&mut self) -> Result<EnvironmentMap, String> {
         // Resample the largest first, and the others to its size.
-        let side = self.maps.iter().map(|map| map.side).max().unwrap_or(0);
+        let side = self.maps.iter().map(|(map, _)| map.width).max().unwrap_or(0);
         let mut sum: Option<EnvironmentMap> = None;
-        for map in self.maps.drain(..) {
-            let texels = enlarge(map.texels, map.side, side);
-            let turn = map.light_from_world.as_mat3();
-            let map = resample(&texels, side, turn, map.source);
+        for (map, light_from_world) in self.maps.drain(..) {
+            let texels = enlarge(map.texels, map.width, side);
+            let map = resample(&texels, side, light_from_world.as_mat3(), map.source);
             match &mut sum {
                 None => sum = Some(map),
                 Some(sum) => {
