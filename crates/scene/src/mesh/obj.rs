@@ -106,9 +106,8 @@ struct ObjReader {
     mesh: Mesh,
     /// Index into `mesh.materials` by name.
     material_indices: HashMap<String, usize>,
-    library: Vec<LibraryMaterial>,
-    /// Index of the last of `library` with a name.
-    library_indices: HashMap<String, usize>,
+    /// The last material of each name in the libraries.
+    library: HashMap<String, LibraryMaterial>,
     images: Images,
     ignored: Ignored,
     first_smoothing: Option<usize>,
@@ -256,8 +255,8 @@ impl ObjReader {
         if let Some(&index) = self.material_indices.get(name) {
             return index;
         }
-        let material = if let Some(&index) = self.library_indices.get(name) {
-            self.library[index].finish(&mut self.images, warnings)
+        let material = if let Some(found) = self.library.get(name) {
+            found.finish(&mut self.images, warnings)
         } else {
             let mut ignored = Ignored::default();
             ignored.add(features::OBJ_UNDESCRIBED, || format!("`{name}`, line {}", self.line));
@@ -301,10 +300,8 @@ impl ObjReader {
             self.mesh.side_files.push(path.clone());
             let mut library = Library::new(&folder, &path);
             for_each_line(&path, BufReader::new(file), |line, text| library.read_line(line, text))?;
-            let first = self.library.len();
-            self.library.extend(library.materials);
-            let read = (first..).zip(&self.library[first..]);
-            self.library_indices.extend(read.map(|(index, found)| (found.name.clone(), index)));
+            let read = library.materials.into_iter().map(|found| (found.name.clone(), found));
+            self.library.extend(read);
         }
         Ok(())
     }
