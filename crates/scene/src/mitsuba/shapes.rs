@@ -341,12 +341,7 @@ fn placement(node: Node<'_>, matrix: DMat4) -> Result<Transform> {
 
 /// Axes whose z leads along `axis` with its length, as Mitsuba chooses the others \[Duff et al. 2017\].
 fn frame_along(axis: DVec3) -> Option<DMat3> {
-    let z = axis.try_normalize()?;
-    let sign = if z.z >= 0.0 { 1.0 } else { -1.0 };
-    let a = -1.0 / (sign + z.z);
-    let b = z.x * z.y * a;
-    let x = DVec3::new(1.0 + sign * z.x * z.x * a, sign * b, -sign * z.x);
-    let y = DVec3::new(b, sign + z.y * z.y * a, -z.y);
+    let (x, y) = axis.try_normalize()?.any_orthonormal_pair();
     Some(DMat3::from_cols(x, y, axis))
 }
 
