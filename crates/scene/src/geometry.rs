@@ -243,17 +243,6 @@ mod tests {
     }
 
     #[test]
-    fn a_mirror_turns_the_winding() {
-        let mut geometry = Geometry::default();
-        let mirror = Transform::new([-1.0, 1.0, 1.0], [0.0; 3], [0.0; 3]);
-        geometry.append(&corner_mesh(), &mirror, |_| 0);
-        assert_eq!(geometry.triangles, [[0, 2, 1]]);
-        let [a, b, c] = geometry.triangles[0]
-            .map(|index| glam::Vec3::from_array(geometry.positions[index as usize]));
-        assert!((b - a).cross(c - a).z > 0.0, "the outside stays outside");
-    }
-
-    #[test]
     fn normals_that_are_not_finite_mark_flat_shading() {
         let mut mesh = corner_mesh();
         mesh.normals = vec![[0.0, 0.0, 2.0], [f32::INFINITY, 0.0, 0.0], [0.0; 3], [0.0, 0.0, 1.0]];

@@ -106,12 +106,6 @@ mod tests {
     }
 
     #[test]
-    fn scale_comes_first_and_shift_last() {
-        let transform = Transform::new([2.0, 1.0, 1.0], [0.0, 90.0, 0.0], [10.0, 0.0, 0.0]);
-        assert_eq!(transform.position([1.0, 0.0, 0.0]), [10.0, 0.0, -2.0]);
-    }
-
-    #[test]
     fn normals_stay_at_right_angles_to_the_surface() {
         let transform = Transform::new([4.0, 1.0, -0.5], [20.0, 40.0, 60.0], [0.0; 3]);
         let tangent = Vec3::new(1.0, -1.0, 0.5);
