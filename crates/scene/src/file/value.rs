@@ -1,7 +1,7 @@
 //! Values that take several forms: numbers for all axes or for each, and textures in place of numbers
 //! and colours.
 
-use std::{fmt, marker::PhantomData, path::PathBuf};
+use std::{fmt, path::PathBuf};
 
 use serde::{
     Deserialize, Deserializer,
@@ -107,66 +107,38 @@ impl<T> Textured<T> {
     }
 }
 
-/// Values that a [`Textured`] may have everywhere.
-trait Plain: Sized {
-    /// Forms in a message.
-    const EXPECTED: &str;
+/// Reader of a texture, or of a plain value of a number or of three.
+struct TexturedVisitor<T> {
+    /// Forms, for messages.
+    expected: &'static str,
+    of_number: fn(f64) -> Option<T>,
+    of_array: fn([f32; 3]) -> Option<T>,
+}
 
-    /// Value of a number, if one number is enough.
-    fn from_number(_: f64) -> Option<Self> {
-        None
-    }
-
-    /// Value of an array of three numbers, if it takes one.
-    fn from_array(_: [f32; 3]) -> Option<Self> {
-        None
+impl<T> TexturedVisitor<T> {
+    fn plain<E: de::Error>(&self, value: Option<T>, found: Unexpected) -> Result<Textured<T>, E> {
+        value.map(Textured::Uniform).ok_or_else(|| E::invalid_type(found, &self.expected))
     }
 }
 
-impl Plain for f32 {
-    const EXPECTED: &str = "a number or a table with `texture`";
-
-    fn from_number(number: f64) -> Option<Self> {
-        Some(number as Self)
-    }
-}
-
-impl Plain for [f32; 3] {
-    const EXPECTED: &str = "an array of three numbers or a table with `texture`";
-
-    fn from_array(array: [f32; 3]) -> Option<Self> {
-        Some(array)
-    }
-}
-
-struct TexturedVisitor<T>(PhantomData<T>);
-
-impl<'de, T: Plain> Visitor<'de> for TexturedVisitor<T> {
+impl<'de, T> Visitor<'de> for TexturedVisitor<T> {
     type Value = Textured<T>;
 
     fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-        formatter.write_str(T::EXPECTED)
+        formatter.write_str(self.expected)
     }
 
     fn visit_f64<E: de::Error>(self, number: f64) -> Result<Self::Value, E> {
-        let value = T::from_number(number);
-        value
-            .map(Textured::Uniform)
-            .ok_or_else(|| E::invalid_type(Unexpected::Float(number), &self))
+        self.plain((self.of_number)(number), Unexpected::Float(number))
     }
 
     fn visit_i64<E: de::Error>(self, number: i64) -> Result<Self::Value, E> {
-        let value = T::from_number(number as f64);
-        value
-            .map(Textured::Uniform)
-            .ok_or_else(|| E::invalid_type(Unexpected::Signed(number), &self))
+        self.plain((self.of_number)(number as f64), Unexpected::Signed(number))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, sequence: A) -> Result<Self::Value, A::Error> {
         let array = <[f32; 3]>::deserialize(value::SeqAccessDeserializer::new(sequence))?;
-        T::from_array(array)
-            .map(Textured::Uniform)
-            .ok_or_else(|| de::Error::invalid_type(Unexpected::Seq, &self))
+        self.plain((self.of_array)(array), Unexpected::Seq)
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
@@ -175,8 +147,21 @@ impl<'de, T: Plain> Visitor<'de> for TexturedVisitor<T> {
     }
 }
 
-impl<'de, T: Plain> Deserialize<'de> for Textured<T> {
+impl<'de> Deserialize<'de> for Textured<f32> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(TexturedVisitor(PhantomData))
+        let expected = "a number or a table with `texture`";
+        let of_number = |number: f64| Some(number as f32);
+        deserializer.deserialize_any(TexturedVisitor { expected, of_number, of_array: |_| None })
+    }
+}
+
+impl<'de> Deserialize<'de> for Textured<[f32; 3]> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let expected = "an array of three numbers or a table with `texture`";
+        deserializer.deserialize_any(TexturedVisitor {
+            expected,
+            of_number: |_| None,
+            of_array: Some,
+        })
     }
 }
