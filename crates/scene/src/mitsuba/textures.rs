@@ -149,9 +149,10 @@ impl Reader {
         // Version 0.6 states an exponent; only that of linear values is different from sRGB.
         let is_linear = parameters.float("gamma")? == Some(1.0);
         let is_raw = parameters.boolean("raw")?.unwrap_or(is_linear);
-        let wrap = |name: &str| {
+        let wrap = |name: &str, absent: Wrap| {
             Ok(match parameters.string(name)? {
-                None | Some("repeat") => Wrap::Repeat,
+                None => absent,
+                Some("repeat") => Wrap::Repeat,
                 Some("mirror") => Wrap::Mirror,
                 Some("clamp") => Wrap::Clamp,
                 Some(found) => {
@@ -161,9 +162,7 @@ impl Reader {
                 }
             })
         };
-        let both = wrap("wrap_mode")?;
-        let of_axis =
-            |name: &str| if parameters.string(name)?.is_some() { wrap(name) } else { Ok(both) };
+        let both = wrap("wrap_mode", Wrap::Repeat)?;
         let interpolation = match parameters.string("filter_type")? {
             Some("nearest") => Interpolation::Nearest,
             None | Some("bilinear" | "trilinear" | "ewa") => Interpolation::Bilinear,
@@ -176,7 +175,7 @@ impl Reader {
         Ok(Some(TextureUse {
             encoding: if is_raw { Encoding::Linear } else { Encoding::Srgb },
             image_from_uv: image_from_uv(parameters)?,
-            wrap: [of_axis("wrap_mode_u")?, of_axis("wrap_mode_v")?],
+            wrap: [wrap("wrap_mode_u", both)?, wrap("wrap_mode_v", both)?],
             interpolation,
             ..TextureUse::new(texture)
         }))

@@ -29,15 +29,13 @@ impl GltfReader<'_> {
         let place = || label("node", node.index(), node.name());
         let lights = &json["extensions"]["KHR_lights_punctual"]["lights"];
         let light = index.as_u64().and_then(|index| lights.get(usize::try_from(index).ok()?));
-        let light = light
-            .ok_or_else(|| self.error(format!("{}: the file has no light {index}", place())))?;
+        let error = |message: String| self.error(format!("{}: {message}", place()));
+        let light = light.ok_or_else(|| error(format!("the file has no light {index}")))?;
         let color = Vec3::from_array(vector(light, "color", [1.0; 3]));
         let intensity = color * number(light, "intensity", 1.0);
         if !intensity.is_finite() || intensity.min_element() < 0.0 {
-            return Err(self.error(format!(
-                "{}: expected a light of finite colour and intensity from 0, found {intensity}",
-                place()
-            )));
+            let expected = "expected a light of finite colour and intensity from 0";
+            return Err(error(format!("{expected}, found {intensity}")));
         }
         let position = world_from_node.w_axis.truncate();
         let direction = world_from_node.transform_vector3(Vec3::NEG_Z).normalize_or(Vec3::NEG_Z);
@@ -50,10 +48,9 @@ impl GltfReader<'_> {
                     && inner_angle_rad < outer_angle_rad
                     && outer_angle_rad <= FRAC_PI_2 + 1e-6;
                 if !is_cone {
-                    return Err(self.error(format!(
-                        "{}: expected the angles of a spot with 0 ≤ innerConeAngle < \
-                         outerConeAngle ≤ π/2, found {inner_angle_rad} and {outer_angle_rad}",
-                        place()
+                    return Err(error(format!(
+                        "expected the angles of a spot with 0 ≤ innerConeAngle < outerConeAngle ≤ \
+                         π/2, found {inner_angle_rad} and {outer_angle_rad}"
                     )));
                 }
                 LampKind::Spot(Spot {
@@ -67,11 +64,9 @@ impl GltfReader<'_> {
             }
             Some("directional") => LampKind::Directional { direction, irradiance: intensity },
             _ => {
-                let found = &light["type"];
-                return Err(self.error(format!(
-                    "{}: expected a light of type point, spot or directional, found {found}",
-                    place()
-                )));
+                let (expected, found) =
+                    ("a light of type point, spot or directional", &light["type"]);
+                return Err(error(format!("expected {expected}, found {found}")));
             }
         };
         if !light["range"].is_null() && !matches!(kind, LampKind::Directional { .. }) {
