@@ -173,7 +173,7 @@ impl Reader {
         if model.surface.normal.is_some() {
             self.ignored.add(features::MI_BUMP_MAP, || parameters.node.place());
         }
-        parameters.without_effect(&["flip_invalid_normals", "use_shadowing_function"]);
+        parameters.without_effect("flip_invalid_normals use_shadowing_function");
         match self.value(parameters, "normalmap", Role::Index)? {
             Some(Value::Texture(texture)) => model.surface.normal = Some(texture),
             _ => return Err(parameters.node.error("normalmap: expected the texture `normalmap`")),
@@ -210,7 +210,7 @@ impl Reader {
                 return Err(node.error(message));
             }
         }
-        parameters.without_effect(&["sample_visible", "specular_sampling_weight"]);
+        parameters.without_effect("sample_visible specular_sampling_weight");
         self.width_of(parameters)
     }
 

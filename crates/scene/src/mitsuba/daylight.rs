@@ -53,7 +53,7 @@ impl Reader {
             let name = format!("`stretch` of `{}`", node.kind());
             self.ignored.add_named(features::MI_PARAMETER, &name, || node.place());
         }
-        parameters.without_effect(&["resolution", "extend", "sun_samples"]);
+        parameters.without_effect("resolution extend sun_samples");
         let daylight = Daylight {
             up: up.as_vec3(),
             sun: sun.as_vec3(),

@@ -52,7 +52,7 @@ impl Reader {
                 return Ok(());
             }
         };
-        parameters.without_effect(&["sampling_weight"]);
+        parameters.without_effect("sampling_weight");
         parameters.finish(&mut self.ignored);
         if let Some(kind) = kind {
             let name = node.attribute("id").unwrap_or_default().to_owned();
@@ -76,7 +76,7 @@ impl Reader {
         let path = node.file(name)?;
         let scale = parameters.float_in("scale", (0.0, f32::MAX))?.unwrap_or(1.0);
         let matrix = parameters.transform("to_world")?;
-        parameters.without_effect(&["mis_compensation", "cache", "gamma"]);
+        parameters.without_effect("mis_compensation cache gamma");
         let map = environment::load(&path, scale, matrix, &mut self.warnings)?;
         self.inputs.push(path);
         map.ok_or_else(|| {
@@ -114,7 +114,7 @@ impl Reader {
         }
         let parameters = Parameters::new(node);
         let value = self.value_or(&parameters, "radiance", Role::Light, 1.0)?;
-        parameters.without_effect(&["sampling_weight"]);
+        parameters.without_effect("sampling_weight");
         parameters.finish(&mut self.ignored);
         if value.is_of_vertices() {
             return Err(node.error("radiance: expected a colour or a bitmap, found vertex colours"));

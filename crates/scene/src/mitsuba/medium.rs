@@ -41,7 +41,7 @@ impl Reader {
             return Ok(None);
         }
         parameters.objects("phase")?;
-        parameters.without_effect(&["sample_emitters"]);
+        parameters.without_effect("sample_emitters");
         parameters.finish(&mut self.ignored);
         Ok(Some((scale * absorption).clamp(Vec3::ZERO, Vec3::splat(1e6))))
     }

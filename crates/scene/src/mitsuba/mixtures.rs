@@ -112,7 +112,7 @@ impl Reader {
         let node = parameters.node;
         self.ignored.add(features::MI_PHONG, || node.place());
         let alpha = if node.kind() == "ward" {
-            parameters.without_effect(&["variant"]);
+            parameters.without_effect("variant");
             self.width_of(parameters)?.alpha
         } else {
             let exponent = self.value_or(parameters, "exponent", Role::Index, 30.0)?;

@@ -110,9 +110,10 @@ impl<'a> Parameters<'a> {
         Ok(objects)
     }
 
-    /// Counts as used what changes nothing in the picture.
-    pub(super) fn without_effect(&self, names: &[&str]) {
-        for child in self.node.children().filter(|child| names.contains(&child.name())) {
+    /// Counts as used what changes nothing in the picture; `names` have spaces between them.
+    pub(super) fn without_effect(&self, names: &str) {
+        let is_named = |child: &Node<'_>| names.split(' ').any(|name| name == child.name());
+        for child in self.node.children().filter(is_named) {
             self.take(child);
         }
     }

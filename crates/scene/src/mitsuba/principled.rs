@@ -32,13 +32,10 @@ impl Reader {
                 self.ignored.add_named(features::MI_PRINCIPLED_REST, &format!("`{name}`"), place);
             }
         }
-        parameters.without_effect(&[
-            "sheen_tint",
-            "clearcoat_gloss",
-            "diffuse_reflectance_sampling_rate",
-            "main_specular_sampling_rate",
-            "clearcoat_sampling_rate",
-        ]);
+        parameters.without_effect(
+            "sheen_tint clearcoat_gloss diffuse_reflectance_sampling_rate \
+             main_specular_sampling_rate clearcoat_sampling_rate",
+        );
         let base = self.value_or(parameters, "base_color", Role::Reflectance, 0.5)?;
         let ior = match (parameters.float_in("eta", (1.0, 4.0))?, parameters.float("specular")?) {
             (Some(eta), _) => eta,

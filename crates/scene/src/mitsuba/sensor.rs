@@ -73,7 +73,7 @@ impl Reader {
         for sampler in parameters.objects("sampler")? {
             self.sampler(sampler)?;
         }
-        parameters.without_effect(&["near_clip", "far_clip", "shutter_open", "shutter_close"]);
+        parameters.without_effect("near_clip far_clip shutter_open shutter_close");
         parameters.finish(&mut self.ignored);
         Ok((camera, film.settings))
     }
@@ -154,7 +154,7 @@ impl Reader {
             focus_distance = parameters.float_in("focus_distance", range)?.unwrap_or(far);
         } else {
             // A pinhole has no use for it; files that were made for both kinds have it.
-            parameters.without_effect(&["focus_distance", "aperture_radius"]);
+            parameters.without_effect("focus_distance aperture_radius");
         }
         let position = matrix.w_axis.truncate();
         // Look at a point so far away that single precision keeps the direction.
@@ -204,22 +204,10 @@ impl Reader {
                 self.ignored.add(features::MI_CROP, || parameters.node.place());
             }
             filter = self.filter(parameters)?;
-            parameters.without_effect(&[
-                "file_format",
-                "pixel_format",
-                "component_format",
-                "banner",
-                "sample_border",
-                "compensate",
-                "gamma",
-                "exposure",
-                "high_quality_edges",
-                "attach_log",
-                "label",
-                "tonemap_method",
-                "key",
-                "burn",
-            ]);
+            parameters.without_effect(
+                "file_format pixel_format component_format banner sample_border compensate \
+                 gamma exposure high_quality_edges attach_log label tonemap_method key burn",
+            );
             parameters.finish(&mut self.ignored);
         }
         let settings = FilmSettings { width: rendered.0 as u32, height: rendered.1 as u32, filter };
@@ -239,7 +227,7 @@ impl Reader {
             "box" => (Filter::Box, is_half("radius")?),
             "gaussian" => (Filter::Gaussian, is_half("stddev")?),
             "tent" | "mitchell" | "catmullrom" | "lanczos" => {
-                parameters.without_effect(&["radius", "B", "C", "b", "c", "lobes"]);
+                parameters.without_effect("radius B C b c lobes");
                 (Filter::Gaussian, false)
             }
             found => {

@@ -23,7 +23,7 @@ impl Reader {
             "hair" => Some(f64::from(parameters.float("radius")?.unwrap_or(0.025))),
             _ => None,
         };
-        parameters.without_effect(&["angle_threshold", "reduction"]);
+        parameters.without_effect("angle_threshold reduction");
         let bytes = files::read(&path)?;
         let strands = match (bytes.strip_prefix(BINARY_HAIR), radius) {
             (Some(bytes), Some(radius)) => binary(bytes, radius),

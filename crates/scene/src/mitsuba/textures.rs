@@ -171,7 +171,7 @@ impl Reader {
                 return Err(node.error(message));
             }
         };
-        parameters.without_effect(&["format", "cache", "max_anisotropy", "accel"]);
+        parameters.without_effect("format cache max_anisotropy accel");
         Ok(Some(TextureUse {
             encoding: if is_raw { Encoding::Linear } else { Encoding::Srgb },
             image_from_uv: image_from_uv(parameters)?,

@@ -140,7 +140,7 @@ fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, 
             }
         }
         // No part of the picture.
-        entity.without_effect(&["filename", "savefp16", "diagonal", "coordinatesystem"]);
+        entity.without_effect("filename savefp16 diagonal coordinatesystem");
         log.unused(entity);
     }
     let aspect = f64::from(film.width) / f64::from(film.height);

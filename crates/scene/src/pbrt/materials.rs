@@ -82,12 +82,10 @@ impl<'a> Materials<'a> {
             "coatedconductor" => {
                 self.textures.log.ignore(features::PBRT_COATED_CONDUCTOR, &entity.place);
                 self.layers(entity)?;
-                entity.without_effect(&[
-                    "interface.roughness",
-                    "interface.uroughness",
-                    "interface.vroughness",
-                    "interface.eta",
-                ]);
+                entity.without_effect(
+                    "interface.roughness interface.uroughness interface.vroughness \
+                     interface.eta",
+                );
                 self.conductor(entity, "conductor.", &mut surface)?
             }
             "dielectric" => {
@@ -109,22 +107,14 @@ impl<'a> Materials<'a> {
             }
             "subsurface" => {
                 self.textures.log.ignore(features::PBRT_SUBSURFACE, &entity.place);
-                entity.without_effect(&["name", "mfp", "sigma_a", "sigma_s", "g", "scale"]);
+                entity.without_effect("name mfp sigma_a sigma_s g scale");
                 self.plastic(entity, &mut surface)?
             }
             "hair" => {
                 self.textures.log.ignore(features::PBRT_HAIR, &entity.place);
-                entity.without_effect(&[
-                    "sigma_a",
-                    "reflectance",
-                    "color",
-                    "eumelanin",
-                    "pheomelanin",
-                    "eta",
-                    "beta_m",
-                    "beta_n",
-                    "alpha",
-                ]);
+                entity.without_effect(
+                    "sigma_a reflectance color eumelanin pheomelanin eta beta_m beta_n alpha",
+                );
                 MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) }
             }
             "mix" => return self.mix(entity, name),
@@ -161,7 +151,7 @@ impl<'a> Materials<'a> {
 
     /// Marks the parameters of a coat as read, and reports a coat that absorbs or scatters.
     fn layers(&mut self, entity: &Entity) -> Result<()> {
-        entity.without_effect(&["thickness", "maxdepth", "nsamples", "g"]);
+        entity.without_effect("thickness maxdepth nsamples g");
         let is_clear = match self.textures.spectrum(entity, "albedo")? {
             Some(Value::Constant(albedo)) => albedo == Vec3::ZERO,
             Some(Value::Image(_)) => false,

@@ -319,9 +319,10 @@ impl Entity {
         }
     }
 
-    /// Counts as asked for what changes nothing in the picture, or is named as a whole.
-    pub(super) fn without_effect(&self, names: &[&str]) {
-        for name in names {
+    /// Counts as asked for what changes nothing in the picture, or is named as a whole; `names` have spaces
+    /// between them.
+    pub(super) fn without_effect(&self, names: &str) {
+        for name in names.split(' ') {
             self.find(name);
         }
     }

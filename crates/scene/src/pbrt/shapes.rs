@@ -208,7 +208,7 @@ fn curve(entity: &Entity, strands: &mut Detail, log: &mut Log) -> Result<Mesh> {
     let width = entity.number("width", 1.0)?;
     let [from, to] = [entity.number("width0", width)?, entity.number("width1", width)?];
     // All kinds are as wide to a ray.
-    entity.without_effect(&["type", "N", "splitdepth"]);
+    entity.without_effect("type N splitdepth");
     // Widths that are linear in the number of a control point are linear along the curve.
     let [shift, length] = match basis {
         Basis::Spline(degree) => [0.5 * (degree as f64 - 1.0), spans as f64],

@@ -16,18 +16,8 @@ use crate::{
 };
 
 /// Parts of the document with extensions that belong to no material, node or mesh.
-const OTHER_PARTS: [&str; 10] = [
-    "accessors",
-    "animations",
-    "bufferViews",
-    "buffers",
-    "cameras",
-    "images",
-    "samplers",
-    "scenes",
-    "skins",
-    "textures",
-];
+const OTHER_PARTS: &str =
+    "accessors animations bufferViews buffers cameras images samplers scenes skins textures";
 
 /// Counts an extension, unless it is done.
 fn ignore_extension(ignored: &mut Ignored, extension: &str, place: impl FnOnce() -> String) {
@@ -74,7 +64,7 @@ impl GltfReader<'_> {
         for scene in document.scenes().skip(1) {
             ignored.add(features::GLTF_SCENES, || label("scene", scene.index(), scene.name()));
         }
-        for part in OTHER_PARTS {
+        for part in OTHER_PARTS.split(' ') {
             for (index, value) in json[part].as_array().into_iter().flatten().enumerate() {
                 ignore_extensions(ignored, value, &|| format!("{part} {index}"));
             }
