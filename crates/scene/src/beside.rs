@@ -37,9 +37,6 @@ impl Folder {
     }
 
     /// As [`Folder::file`], for a name that is relative to the folder `within` of this one.
-    ///
-    /// # Errors
-    /// As [`Folder::file`].
     pub(crate) fn file_within(&self, within: &Path, name: &str) -> Result<PathBuf, String> {
         let slashed = name.replace('\\', "/");
         // A colon begins a URI or names a drive.

@@ -400,9 +400,6 @@ impl Image {
 
 /// Writes the channels `R`, `G`, `B` with ZIP compression, atomically, by the colours of columns and rows,
 /// which are not held in memory.
-///
-/// # Errors
-/// As [`Image::write_exr`].
 pub(crate) fn write_colors(
     path: &Path,
     [width, height]: [usize; 2],

@@ -76,9 +76,6 @@ impl EnvironmentMap {
     }
 
     /// As [`EnvironmentMap::load`], for an image of any ratio and mapping.
-    ///
-    /// # Errors
-    /// As [`EnvironmentMap::load`].
     pub(crate) fn read(path: &Path, scale: f32, warnings: &mut Vec<String>) -> Result<Self> {
         let read = match files::extension(path).as_str() {
             "hdr" => read_hdr,

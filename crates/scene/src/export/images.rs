@@ -89,9 +89,6 @@ impl Pictures {
     }
 
     /// Writes all images and copies into a folder.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`] for a file that cannot be read or written.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
         for (index, path) in self.copies.iter().enumerate() {
             let bytes = files::read(path)?;

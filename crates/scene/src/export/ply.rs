@@ -20,9 +20,6 @@ pub(super) struct Attributes {
 pub(super) const SAME_UV: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
 /// Writes a part as little-endian PLY, without normals if it is flat.
-///
-/// # Errors
-/// Those of `file`.
 pub(super) fn write(
     file: &mut impl Write,
     part: &Part,

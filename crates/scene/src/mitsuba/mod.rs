@@ -2,7 +2,8 @@
 //!
 //! `document` makes one tree of all files, `parameters` and `spectra` read from it, and one module
 //! each turns shapes, models, textures, lights and sensors into Fenestra's. Conventions are those of
-//! Mitsuba 3.9.1, whose documentation is at <https://mitsuba.readthedocs.io>.
+//! Mitsuba 3.9.1, whose documentation is at <https://mitsuba.readthedocs.io>. Errors carry file and line
+//! of the element at fault.
 
 mod bsdfs;
 mod daylight;

@@ -29,9 +29,6 @@ struct Film {
 impl Reader {
     /// Reads the sensor named or numbered `name`, else the first, and names the others; `root` is the place
     /// of errors.
-    ///
-    /// # Errors
-    /// [`crate::Error`] if there is none or none of that name.
     pub(super) fn sensor(
         &mut self,
         root: Node<'_>,

@@ -31,9 +31,6 @@ pub(super) enum Role {
 }
 
 /// Colour of a parameter, if it is there.
-///
-/// # Errors
-/// As [`color`].
 pub(super) fn parameter(
     parameters: &Parameters<'_>,
     name: &str,
@@ -43,9 +40,6 @@ pub(super) fn parameter(
 }
 
 /// Colour of an element that is no texture.
-///
-/// # Errors
-/// [`crate::Error::Parse`] for another element, and for text that holds no numbers.
 pub(super) fn color(node: Node<'_>, role: Role) -> Result<Vec3> {
     let color = match node.tag() {
         "float" | "integer" => Vec3::splat(float(node)?),

@@ -12,18 +12,12 @@ use crate::error::Result;
 pub(super) const NO_INVERSE: &str = "to_world: expected a matrix with an inverse";
 
 /// Unit direction in the world of a direction of a placed object.
-///
-/// # Errors
-/// [`crate::Error::Parse`] if the matrix leaves nothing of it.
 pub(super) fn turned(node: Node<'_>, matrix: DMat4, direction: DVec3) -> Result<DVec3> {
     let direction = matrix.transform_vector3(direction).try_normalize();
     direction.ok_or_else(|| node.error(NO_INVERSE))
 }
 
 /// Matrix of a `transform`.
-///
-/// # Errors
-/// [`crate::Error::Parse`] for an element that is no transform, and for a matrix that is not affine.
 pub(super) fn transform(node: Node<'_>) -> Result<DMat4> {
     let mut matrix = DMat4::IDENTITY;
     for child in node.children() {

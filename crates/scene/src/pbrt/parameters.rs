@@ -111,10 +111,6 @@ impl Parameter {
     }
 
     /// Reads one parameter whose type and name are the last token.
-    ///
-    /// # Errors
-    /// With the place for unknown types, values of another type, a number of values that does not
-    /// fit, and the end of the file.
     fn read(source: &mut Source) -> Result<Self> {
         let place = source.place();
         let mut words = source.text().split_ascii_whitespace();
@@ -240,9 +236,6 @@ pub(super) struct Entity {
 
 impl Entity {
     /// Reads the parameters that follow; `inherited` serve where the directive has none.
-    ///
-    /// # Errors
-    /// Those of [`Parameter`], and for a parameter that is given twice.
     pub(super) fn read(
         source: &mut Source,
         directive: &'static str,

@@ -109,10 +109,6 @@ impl Source {
     }
 
     /// Goes on with another file, until its end. `restores` marks an import.
-    ///
-    /// # Errors
-    /// [`Parse`](crate::error::Error::Parse) with the place of the statement for a file outside the
-    /// scene's folder, one that includes itself, one that cannot be read, and too many files in one another.
     pub(super) fn include(&mut self, name: &str, restores: bool, place: &Place) -> Result<()> {
         let path = self.folder.file(name).map_err(|message| place.error(message))?;
         if self.stack.iter().any(|open| files::is_same_file(&open.tokens.place.path, &path)) {

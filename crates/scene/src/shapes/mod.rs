@@ -194,9 +194,6 @@ impl Builder {
     }
 
     /// Returns the mesh, turned inside out if wound inward (a profile given from top to bottom).
-    ///
-    /// # Errors
-    /// Returns a message about a shape of more than [`MAX_TRIANGLES`].
     fn finish(self) -> Result<Mesh, String> {
         check_triangles(self.asked_triangles)?;
         if let Some(shortage) = self.shortage {
@@ -213,9 +210,6 @@ impl Builder {
 }
 
 /// Checks the number of triangles of a scene's shapes.
-///
-/// # Errors
-/// Returns a message with both numbers.
 pub(crate) fn check_triangles(found: usize) -> Result<(), String> {
     if found > MAX_TRIANGLES {
         return Err(format!(

@@ -84,9 +84,6 @@ impl Sheet {
     }
 
     /// Writes the image.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`] for a file that cannot be written.
     pub(super) fn write(&self, path: &Path) -> Result<()> {
         let Some(used) = self.sources().next() else { return Ok(()) };
         let size = [used.texture.width, used.texture.height];
