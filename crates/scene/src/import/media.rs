@@ -38,19 +38,9 @@ pub(crate) fn illuminant(name: &str) -> Option<DVec3> {
     Some(rgb_from_xyz(dvec3(x / y, 1.0, (1.0 - x - y) / y)))
 }
 
-/// Names of all conductors, for messages.
-pub(crate) fn conductor_names() -> String {
-    CONDUCTORS.map(|(name, _)| name).join(", ")
-}
-
-/// Names of all dielectrics, for messages.
-pub(crate) fn dielectric_names() -> String {
-    DIELECTRICS.map(|(name, _)| name).join(", ")
-}
-
 /// As documented for Mitsuba's `dielectric`.
 #[rustfmt::skip]
-const DIELECTRICS: [(&str, f32); 23] = [
+pub(crate) const DIELECTRICS: [(&str, f32); 23] = [
     ("vacuum", 1.0),
     ("helium", 1.000036),
     ("hydrogen", 1.000132),
@@ -81,7 +71,7 @@ const DIELECTRICS: [(&str, f32); 23] = [
 /// For Ag, Al, Au, Cu, CuZn, MgO and TiO2, η is the mean under D65, and k gives the colour of the reflectance
 /// at normal incidence, at most 0.98. The others are what Mitsuba 3.9.1 renders in RGB, cut off at 0.
 #[rustfmt::skip]
-const CONDUCTORS: [(&str, [[f64; 3]; 2]); 38] = [
+pub(crate) const CONDUCTORS: [(&str, [[f64; 3]; 2]); 38] = [
     ("a-C", [[2.94405, 2.22714, 1.96816], [0.887465, 0.799299, 0.81529]]),
     ("Ag", [[0.128, 0.124, 0.151], [4.049, 3.343, 2.393]]),
     ("Al", [[1.407, 0.927, 0.584], [7.655, 6.611, 5.296]]),

@@ -257,7 +257,7 @@ impl Reader {
             }
             let medium = values::value(node)?;
             media::dielectric(medium).ok_or_else(|| {
-                let names = media::dielectric_names();
+                let names = media::DIELECTRICS.map(|(name, _)| name).join(", ");
                 node.error(format!("{name}: expected a number or one of {names}, found `{medium}`"))
             })
         };
@@ -322,7 +322,7 @@ impl Reader {
             (Some(name), None, None) => Some(
                 media::conductor(name).map(|(eta, k)| (eta.as_vec3(), k.as_vec3())).ok_or_else(
                     || {
-                        let names = media::conductor_names();
+                        let names = media::CONDUCTORS.map(|(name, _)| name).join(", ");
                         node.error(format!(
                             "material: expected none or one of {names}, found `{name}`"
                         ))

@@ -64,7 +64,8 @@ fn parse(bytes: &[u8], index: usize) -> Result<(Mesh, bool), String> {
     let (Some(mesh), Some(version)) = (mesh, header(start)) else {
         return Err(format!("mesh {index} does not begin where the file says"));
     };
-    Stream::new(mesh).mesh(version)
+    let left = (mesh.len() as u64).saturating_mul(LARGEST_RATIO);
+    Stream { decoder: ZlibDecoder::new(mesh), left }.mesh(version)
 }
 
 /// Numbers of a zlib stream, with a bound on what it can hold.
@@ -74,12 +75,7 @@ struct Stream<'a> {
     left: u64,
 }
 
-impl<'a> Stream<'a> {
-    fn new(bytes: &'a [u8]) -> Self {
-        let left = (bytes.len() as u64).saturating_mul(LARGEST_RATIO);
-        Self { decoder: ZlibDecoder::new(bytes), left }
-    }
-
+impl Stream<'_> {
     fn bytes(&mut self, count: u64) -> Result<Vec<u8>, String> {
         let Some(left) = self.left.checked_sub(count) else {
             return Err("its header promises more than the file holds".to_owned());

@@ -9,7 +9,6 @@ use super::{
     document::Node,
     parameters::Parameters,
     spectra::{self, Role},
-    transforms,
 };
 use crate::{
     error::Result,
@@ -226,7 +225,13 @@ fn checkerboard(parameters: &Parameters<'_>, ignored: &mut Ignored) -> Result<Te
 /// OBJ reader turns v round. `uoffset` and `uscale` of version 0.6 go in the order of its upgrade.
 fn image_from_uv(parameters: &Parameters<'_>) -> Result<[[f32; 3]; 2]> {
     let matrix = parameters.transform("to_uv")?;
-    let [mut u, mut v] = transforms::of_coordinates(parameters.node, matrix)?;
+    let [mut u, mut v] = [0, 1].map(|index| {
+        let row = matrix.row(index);
+        [row.x, row.y, row.w].map(|number| number as f32)
+    });
+    if !u.iter().chain(&v).all(|number| number.is_finite()) {
+        return Err(parameters.node.error("to_uv: expected finite numbers"));
+    }
     for (row, axis) in [(&mut u, "u"), (&mut v, "v")] {
         let scale = parameters.float(&format!("{axis}scale"))?.unwrap_or(1.0);
         row[2] += parameters.float(&format!("{axis}offset"))?.unwrap_or(0.0);

@@ -115,17 +115,3 @@ fn look_at(node: Node<'_>) -> Result<DMat4> {
     let rotation = DMat3::from_cols(left, forward.cross(left), forward);
     Ok(DMat4::from(DAffine3::from_mat3_translation(rotation, origin)))
 }
-
-/// Rows of a transform of texture coordinates.
-pub(super) fn of_coordinates(node: Node<'_>, matrix: DMat4) -> Result<[[f32; 3]; 2]> {
-    let row = |index: usize| {
-        let row = matrix.row(index);
-        [row.x, row.y, row.w].map(|number| number as f32)
-    };
-    let rows = [row(0), row(1)];
-    if rows.iter().flatten().all(|number| number.is_finite()) {
-        Ok(rows)
-    } else {
-        Err(node.error("to_uv: expected finite numbers"))
-    }
-}

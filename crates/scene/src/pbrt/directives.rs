@@ -302,14 +302,6 @@ impl<'a> Reader<'a> {
         Err(place.error(format!("{name}: the transformation leaves the range of numbers")))
     }
 
-    fn object_index(&mut self, name: String) -> usize {
-        let objects = &mut self.description.objects;
-        *self.object_names.entry(name.clone()).or_insert_with(|| {
-            objects.push(Object { name, ..Object::default() });
-            objects.len() - 1
-        })
-    }
-
     fn object(&mut self, directive: &str, place: Place) -> Result<()> {
         self.check_world(directive, &place)?;
         if directive == "ObjectEnd" {
@@ -317,11 +309,15 @@ impl<'a> Reader<'a> {
             return self.states.restore(Saved::ObjectBegin, &place);
         }
         let name = self.text(directive)?;
-        let index = self.object_index(name.clone());
         if self.object.is_some() {
             return Err(place.error(format!("{directive} `{name}` inside an object")));
         }
-        let object = &mut self.description.objects[index];
+        let objects = &mut self.description.objects;
+        let index = *self.object_names.entry(name.clone()).or_insert(objects.len());
+        if index == objects.len() {
+            objects.push(Object { name: name.clone(), ..Object::default() });
+        }
+        let object = &mut objects[index];
         if directive == "ObjectInstance" {
             let world_from_object = self.states.now.ctm;
             object.instances.push(Instance { world_from_object, place });

@@ -23,10 +23,6 @@ struct Ring {
 }
 
 impl Ring {
-    fn is_boundary(&self) -> bool {
-        self.boundary_count > 0
-    }
-
     /// Weight of each neighbour of an inner vertex.
     fn beta(&self) -> f64 {
         let count = f64::from(self.count.max(1));
@@ -35,7 +31,7 @@ impl Ring {
 
     /// Blends a vertex with its neighbours, of which each has a weight.
     fn blend(&self, position: DVec3, inner_weight: f64, boundary_weight: f64) -> DVec3 {
-        let (sum, count, weight) = if self.is_boundary() {
+        let (sum, count, weight) = if self.boundary_count > 0 {
             (self.boundary_sum, self.boundary_count, boundary_weight)
         } else {
             (self.sum, self.count, inner_weight)

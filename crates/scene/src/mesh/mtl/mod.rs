@@ -52,10 +52,6 @@ pub(super) struct LibraryMaterial {
 }
 
 impl LibraryMaterial {
-    fn new(name: &str) -> Self {
-        Self { name: name.to_owned(), diffuse: Vec3::ONE, model: 2, ..Self::default() }
-    }
-
     fn ignore(&mut self, feature: Feature, kind: &str) {
         let place = || format!("material `{}`, {}", self.name, self.place);
         self.ignored.add_named(feature, kind, place);
@@ -78,7 +74,8 @@ impl<'a> Library<'a> {
         let text = text.split('#').next().unwrap_or_default().trim();
         let (key, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
         if key == "newmtl" {
-            self.materials.push(LibraryMaterial::new(rest.trim()));
+            let (name, diffuse) = (rest.trim().to_owned(), Vec3::ONE);
+            self.materials.push(LibraryMaterial { name, diffuse, model: 2, ..Default::default() });
             return Ok(());
         }
         let Self { folder, within, path, materials } = self;

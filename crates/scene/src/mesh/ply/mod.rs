@@ -93,7 +93,11 @@ fn read_from<R: BufRead>(path: &Path, reader: R, file_bytes: u64) -> Result<Mesh
             }
         }
     }
-    polygons.triangulate_into(&mut mesh);
+    let mut start = 0;
+    for end in polygons.ends {
+        mesh.push_polygon(&polygons.corners[start..end]);
+        start = end;
+    }
     Ok(mesh)
 }
 
@@ -116,16 +120,6 @@ fn vertex_count(path: &Path, elements: &[Element]) -> Result<u32> {
 struct Polygons {
     corners: Vec<u32>,
     ends: Vec<usize>,
-}
-
-impl Polygons {
-    fn triangulate_into(self, mesh: &mut Mesh) {
-        let mut start = 0;
-        for end in self.ends {
-            mesh.push_polygon(&self.corners[start..end]);
-            start = end;
-        }
-    }
 }
 
 /// Reader with its position in the file.
