@@ -49,10 +49,6 @@ impl Kind {
         (Self::Texture, &["texture"]),
     ];
 
-    fn from_name(name: &str) -> Option<Self> {
-        Self::NAMES.iter().find(|(_, names)| names.contains(&name)).map(|(kind, _)| *kind)
-    }
-
     fn name(self) -> &'static str {
         Self::NAMES[self as usize].1[0]
     }
@@ -119,7 +115,8 @@ impl Parameter {
             let message = format!("expected a type and a name in quotes, found {found:?}");
             return Err(place.error(message));
         };
-        let Some(kind) = Kind::from_name(type_name) else {
+        let mut kinds = Kind::NAMES.into_iter();
+        let Some((kind, _)) = kinds.find(|(_, names)| names.contains(&type_name)) else {
             return Err(place.error(format!(
                 "parameter `{name}`: unknown type `{type_name}`; expected bool, integer, float, \
                  point2, vector2, point3, vector3, normal, rgb, spectrum, blackbody, string or \
