@@ -80,16 +80,9 @@ impl Loader<'_> {
             start.name = format!("{stem}/{}", start.name);
         }
         self.include_instances(&label, geometry, &mut placed, &transform, &places, materials)?;
-        let mesh = Mesh {
-            positions: placed.positions,
-            normals: placed.normals,
-            uvs: placed.uvs,
-            tangents: placed.tangents,
-            colors: placed.colors,
-            triangles: placed.triangles,
-            objects: placed.objects,
-            ..Mesh::default()
-        };
+        let Geometry { positions, normals, uvs, tangents, colors, triangles, objects, .. } = placed;
+        let rest = Mesh::default();
+        let mesh = Mesh { positions, normals, uvs, tangents, colors, triangles, objects, ..rest };
         let of = |index: usize| places[placed.materials[index] as usize];
         let dropped = geometry.append(&mesh, &transform, of);
         let positions = geometry.positions[first_vertex..].iter().copied().map(Vec3::from);
