@@ -103,11 +103,9 @@ impl Reader {
             return self.instance(node, outer, groups_left);
         }
         let is_shared = groups_left < MAX_GROUPS;
-        if !self.shapes.contains_key(&node.index) && !self.can_be_read(node)? {
-            return Ok(());
-        }
-        let shape = match self.shapes.get(&node.index) {
-            Some(shape) => Arc::clone(shape),
+        let shape = match self.shapes.get(&node.index).cloned() {
+            Some(shape) => shape,
+            None if !self.can_be_read(node)? => return Ok(()),
             None => {
                 let shape = Arc::new(self.read_shape(node)?);
                 if is_shared {
