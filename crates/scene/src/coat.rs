@@ -2,6 +2,9 @@
 
 use glam::{Vec2, Vec3};
 
+/// Refractive indices that a coat may have.
+pub(crate) const COAT_IOR: (f32, f32) = (1.01, 4.0);
+
 /// Reflectance of a dielectric of refractive index `ior` ≥ 1 seen from outside; exact Fresnel.
 pub fn fresnel_dielectric(cosine: f32, ior: f32) -> f32 {
     let g = (ior * ior - 1.0 + cosine * cosine).max(0.0).sqrt();

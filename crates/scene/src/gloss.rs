@@ -5,6 +5,8 @@ use glam::Vec3;
 
 /// Reflectance at normal incidence of the dielectric of refractive index 1.5.
 pub(crate) const DIELECTRIC: f32 = 0.04;
+/// That index, which materials have that state none.
+pub(crate) const DEFAULT_IOR: f32 = 1.5;
 const TINY: f32 = 1e-6;
 
 /// Base colour and share of metal that reflect as a diffuse and a specular colour do, of which the diffuse

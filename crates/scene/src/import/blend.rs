@@ -142,13 +142,10 @@ fn blend_lobes(
         let kind = MaterialKind::Diffuse { reflectance: Vec3::ONE };
         return Some((kind, Surface { color, ..rest }));
     }
-    let kind = MaterialKind::Principled(Principled { ior: IOR, ..Principled::default() });
+    let kind = MaterialKind::Principled(Principled::default());
     let (roughness, metallic) = (Some(images.roughness), Some(images.metallic));
     Some((kind, Surface { color, roughness, metallic, ..rest }))
 }
-
-/// Refractive index of a dielectric whose reflectance is [`DIELECTRIC`].
-const IOR: f32 = 1.5;
 
 /// Reflection of a material as a diffuse and a specular part.
 #[derive(Clone, Copy, Debug, Default)]
@@ -228,9 +225,8 @@ impl Lobes {
             base_color,
             metallic,
             roughness: self.roughness,
-            ior: IOR,
             specular,
-            specular_color: Vec3::ONE,
+            ..Principled::default()
         })
     }
 }

@@ -41,8 +41,6 @@ pub(crate) struct Imported {
     pub warnings: Vec<String>,
 }
 
-/// Refractive indices that a coat may have.
-pub(crate) const COAT_IOR: (f32, f32) = (1.01, 4.0);
 /// Refractive indices of solids.
 pub(crate) const SOLID_IOR: (f32, f32) = (0.1, 10.0);
 

@@ -10,9 +10,9 @@ use glam::Vec3;
 use super::{FINITE, Loader, MIN_ALPHA};
 use crate::{
     Scene,
+    coat::COAT_IOR,
     error::{Error, Result},
     file::{MaterialEntry, MaterialKeys, MaterialKindEntry, TextureEntry, Textured},
-    import::COAT_IOR,
     material::{ConductorFresnel, Emission, Material, MaterialKind, Opacity, Principled, Surface},
     measured::MeasuredFiles,
     texture::{Encoding, Texture, TextureCache, TextureUse},

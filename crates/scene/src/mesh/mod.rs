@@ -12,7 +12,7 @@ pub mod ply;
 mod tangents;
 
 use std::{
-    ops::{Range, RangeInclusive},
+    ops::Range,
     path::{Path, PathBuf},
 };
 
@@ -25,11 +25,6 @@ use crate::{
     material::Material,
     triangulate::triangulate_in_space,
 };
-
-/// Refractive index of a material that states none, or one that a coat cannot have.
-const DEFAULT_IOR: f32 = 1.5;
-/// Refractive indices of coats and glass.
-const IOR_RANGE: RangeInclusive<f32> = 1.01..=4.0;
 
 /// Name of a part of a file for messages, or its number from 0.
 pub(crate) fn label(part: &str, index: usize, name: Option<&str>) -> String {

@@ -12,10 +12,10 @@ use super::{
 };
 use crate::{
     MIN_ALPHA,
-    coat::{LossyCoat, albedo_below_coat},
+    coat::{COAT_IOR, LossyCoat, albedo_below_coat},
     error::Result,
     features,
-    import::{COAT_IOR, SOLID_IOR, Width, media},
+    import::{SOLID_IOR, Width, media},
     material::{ConductorFresnel, Material, MaterialKind, Surface},
     math::colour::luminance,
 };

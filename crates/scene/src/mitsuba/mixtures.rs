@@ -8,10 +8,11 @@ use super::{
 };
 use crate::{
     MIN_ALPHA,
+    coat::COAT_IOR,
     error::Result,
     features,
     gloss::DIELECTRIC,
-    import::{self, COAT_IOR, Width, blend::mixed},
+    import::{self, Width, blend::mixed},
     material::{Material, MaterialKind, Principled},
     math::colour::luminance,
 };

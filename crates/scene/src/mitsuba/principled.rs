@@ -5,10 +5,9 @@ use glam::Vec3;
 use super::{Reader, bsdfs::colored, parameters::Parameters, spectra::Role, textures::Value};
 use crate::{
     MIN_ALPHA,
-    coat::{normal_reflectance, principled_base_factor},
+    coat::{COAT_IOR, normal_reflectance, principled_base_factor},
     error::Result,
     features,
-    import::COAT_IOR,
     material::{Material, MaterialKind, Principled},
 };
 

@@ -10,10 +10,10 @@ use super::{
     textures::{Textures, map_numbers},
 };
 use crate::{
-    coat::albedo_below_coat,
+    coat::{COAT_IOR, albedo_below_coat},
     error::Result,
     features,
-    import::{COAT_IOR, SOLID_IOR, Value, Width, blend::mixed, media, relief::Reliefs},
+    import::{SOLID_IOR, Value, Width, blend::mixed, media, relief::Reliefs},
     material::{ConductorFresnel, Material, MaterialKind, Surface},
     measured::MeasuredFiles,
 };

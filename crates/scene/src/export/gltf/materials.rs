@@ -9,12 +9,10 @@ use super::{
 };
 use crate::{
     export::subject::Subject,
+    gloss::DEFAULT_IOR,
     material::{ConductorFresnel, Emission, MaterialKind, Principled},
     texture::TextureUse,
 };
-
-/// Refractive index of a material that states none.
-const DEFAULT_IOR: f32 = 1.5;
 
 /// Material on its way to the document.
 pub(super) struct Translator<'a> {

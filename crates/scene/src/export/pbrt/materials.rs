@@ -6,14 +6,13 @@ use glam::{Mat3, Vec3};
 
 use super::triple;
 use crate::{
-    coat::base_below_coat,
+    coat::{COAT_IOR, base_below_coat},
     export::{
         folder::Folder,
         images::{Pictures, Recipe},
         ply::Attributes,
         subject::{Opacity, Subject, index_of},
     },
-    import::COAT_IOR,
     material::{ConductorFresnel, MaterialKind},
     texture::{Interpolation, TextureUse, Wrap},
 };

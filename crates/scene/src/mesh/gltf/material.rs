@@ -5,11 +5,12 @@ use serde_json::Value;
 
 use super::{GltfReader, contents::ignore_extensions, glossiness};
 use crate::{
+    coat::COAT_IOR,
     error::Result,
     features::{self, Feature, Ignored},
-    gloss::{DIELECTRIC, metallic_roughness},
+    gloss::{DEFAULT_IOR, DIELECTRIC, metallic_roughness},
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
-    mesh::{DEFAULT_IOR, IOR_RANGE, MeshMaterial, images::opacity_of, label},
+    mesh::{MeshMaterial, images::opacity_of, label},
     texture::{Channels, Encoding, TextureUse, texelwise::lie_alike},
 };
 
@@ -216,7 +217,7 @@ impl GltfReader<'_> {
         // The index 0 stands for an infinite one: all light is reflected before the factors.
         let (ior, whole) = match stated_ior {
             0.0 => (DEFAULT_IOR, DIELECTRIC.recip()),
-            ior => (ior.clamp(*IOR_RANGE.start(), *IOR_RANGE.end()), 1.0),
+            ior => (ior.clamp(COAT_IOR.0, COAT_IOR.1), 1.0),
         };
         let base_color = color(pbr, "baseColorFactor", [1.0; 3]);
         let kind = MaterialKind::Principled(Principled {

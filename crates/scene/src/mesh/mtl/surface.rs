@@ -4,10 +4,12 @@ use glam::Vec3;
 
 use super::{LibraryMaterial, map::Map};
 use crate::{
+    coat::COAT_IOR,
     features::{self, Feature},
+    gloss::DEFAULT_IOR,
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
     mesh::{
-        DEFAULT_IOR, IOR_RANGE, MeshMaterial,
+        MeshMaterial,
         images::{Images, has_alpha, holds_normals, opacity_of},
     },
     texture::{Channels, Encoding},
@@ -79,7 +81,8 @@ impl LibraryMaterial {
             ignored.add(feature, || format!("material `{}`", self.name));
         };
         let opacity = self.opacity.or(self.transparency.map(|share| 1.0 - share)).unwrap_or(1.0);
-        let ior = self.ior.filter(|ior| IOR_RANGE.contains(ior)).unwrap_or(DEFAULT_IOR);
+        let is_of_coat = |ior: &f32| (COAT_IOR.0..=COAT_IOR.1).contains(ior);
+        let ior = self.ior.filter(is_of_coat).unwrap_or(DEFAULT_IOR);
         let is_glossy = self.specular.max_element() > 0.0 && self.model >= 2;
         let is_pane = matches!(self.model, 4 | 6 | 7 | 9) && opacity < PANE_OPACITY;
         let kind = if self.is_metallic_roughness() {
