@@ -8,9 +8,9 @@ use crate::{
 };
 
 impl Loader<'_> {
-    /// Reads the file at the loader's path by its extension, with the camera that is named; `None` for a
-    /// format that cannot be a whole scene.
-    pub(super) fn import(&self, camera: Option<&str>) -> Result<Option<Imported>> {
+    /// Reads the file at the loader's path by its extension; none for a format that is no whole scene.
+    pub(super) fn import(&self) -> Result<Option<Imported>> {
+        let camera = self.options.camera.as_deref();
         let folder = || Folder::of(self.path).allowing(self.options.allow_root.as_deref());
         let mut imported = if files::extension(self.path) == "xml" {
             mitsuba::read(self.path, camera, folder())?
@@ -21,7 +21,7 @@ impl Loader<'_> {
             }
             pbrt::read(self.path, folder())?
         } else if whole::is_whole(self.path) {
-            self.whole(camera)?
+            self.whole()?
         } else {
             return Ok(None);
         };

@@ -147,7 +147,7 @@ impl Loader<'_> {
         Scene { inputs, warnings, .. }: &mut Scene,
     ) -> Result<(Vec<Material>, Geometry, Vec<Lamp>)> {
         if !whole::is_whole(path) {
-            let imported = self.beside(path).import(None)?.ok_or_else(|| {
+            let imported = self.beside(path).import()?.ok_or_else(|| {
                 self.error(format!(
                     "{label}: expected a file in .gltf, .glb, .obj, .pbrt or .xml; other meshes \
                      are objects"

@@ -34,13 +34,13 @@ const FRAMING_FOV_DEG: f32 = 45.0;
 const INSIDE_FOV_DEG: f32 = 60.0;
 
 impl Loader<'_> {
-    /// Reads the mesh file at the loader's path as a whole scene, with the camera that is named.
-    pub(super) fn whole(&self, camera: Option<&str>) -> Result<Imported> {
+    /// Reads the mesh file at the loader's path as a whole scene.
+    pub(super) fn whole(&self) -> Result<Imported> {
         let mut warnings = Vec::new();
         let (variant, budget) = (self.options.variant.as_deref(), Some(Budget::default()));
         let mesh = Mesh::read_at(self.path, self.options.time, variant, budget, &mut warnings)?;
         let mut ignored = mesh.ignored_in_materials(|_| false);
-        let chosen = self.choose_camera(&mesh.cameras, camera, &mut ignored)?;
+        let chosen = self.choose_camera(&mesh.cameras, &mut ignored)?;
         let (materials, geometry) = self.place_whole(&mesh, &mut ignored, &mut warnings)?;
         warnings.extend(ignored.warnings(self.path));
         let (camera, aspect_ratio) = match chosen {
@@ -83,14 +83,13 @@ impl Loader<'_> {
         })
     }
 
-    /// Finds the camera named `name`, else the first with perspective; the others are ignored.
+    /// Finds the camera that the options name, else the first with perspective; the others are ignored.
     fn choose_camera<'a>(
         &self,
         cameras: &'a [MeshCamera],
-        name: Option<&str>,
         ignored: &mut Ignored,
     ) -> Result<Option<(&'a MeshCamera, Perspective)>> {
-        let chosen = match name {
+        let chosen = match &self.options.camera {
             None => cameras.iter().position(|camera| camera.perspective.is_some()),
             Some(name) => {
                 let has_name = |camera: &MeshCamera| camera.names.iter().any(|own| own == name);
