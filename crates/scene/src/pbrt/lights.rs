@@ -33,10 +33,8 @@ pub(super) struct Lights {
 }
 
 fn color(entity: &Entity, name: &str, textures: &Textures) -> Result<Vec3> {
-    match entity.find_of(name, &spectra::KINDS)? {
-        Some(parameter) => spectra::light(parameter, textures.folder),
-        None => Ok(Vec3::ONE),
-    }
+    let found = entity.find_of(name, &spectra::KINDS)?;
+    found.map_or(Ok(Vec3::ONE), |parameter| spectra::light(parameter, textures.folder))
 }
 
 /// Reads the emission of a shape with this area, in the units of the scene.

@@ -130,12 +130,9 @@ impl States {
 
     /// Checks that everything has ended.
     pub(super) fn check_end(&self) -> Result<()> {
-        match self.saved.last() {
-            Some((why, _, place)) => {
-                Err(place.error(format!("{why:?} without an end in the file")))
-            }
-            None => Ok(()),
-        }
+        self.saved.last().map_or(Ok(()), |(why, _, place)| {
+            Err(place.error(format!("{why:?} without an end in the file")))
+        })
     }
 }
 
