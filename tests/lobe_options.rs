@@ -116,28 +116,15 @@ fn what_cannot_be_fitted_is_done_without() {
 }
 
 #[test]
-fn the_walk_is_named_biased() {
+fn the_walk_is_named_biased_and_stays_apart_from_unbiased_films() {
     let folder = clay();
-    let run = run(&folder, &["--sampler", "product", "--set", "elevation=metropolis"]);
-    run.assert(0, &["elevation=metropolis", "biased"]);
-    let statistics = statistics(&folder);
-    assert_eq!(statistics.sampler_parameters["elevation"], "metropolis (biased)");
-    let info = folder.run(&["info", "out.exr"]);
-    assert!(info.output.contains("metropolis (biased)"), "{}", info.output);
-}
-
-#[test]
-fn readings_are_named_biased_and_stay_apart_from_unbiased_films() {
-    let folder = clay();
-    let options = ["--sampler", "visibility", "--set", "reading=weights-before"];
+    let options = ["--sampler", "product", "--set", "elevation=metropolis"];
     let run = run_to(&folder, "biased.exr", "2", &options);
-    run.assert(0, &["--set reading", "so the image is biased"]);
+    run.assert(0, &["elevation=metropolis", "so the image is biased"]);
     let info = folder.run(&["info", "biased.exr"]);
-    assert!(info.output.contains("weights-before (biased)"), "{}", info.output);
-    run_to(&folder, "out.exr", "2", &["--sampler", "visibility", "--sample-offset", "2"])
+    assert!(info.output.contains("metropolis (biased)"), "{}", info.output);
+    run_to(&folder, "out.exr", "2", &["--sampler", "product", "--sample-offset", "2"])
         .assert(0, &[]);
     let merge = folder.run(&["merge", "out.exr", "biased.exr", "-o", "merged.exr"]);
-    merge.assert(1, &["reading", "weights-before (biased)"]);
-    run_to(&folder, "none.exr", "2", &["--sampler", "product", options[2], options[3]])
-        .assert(2, &["reading=weights-before", "no cache", "use --sampler visibility"]);
+    merge.assert(1, &["elevation", "metropolis (biased)"]);
 }

@@ -276,7 +276,6 @@ fn every_range_is_named_where_it_is_left() {
         ("cache", ["scene", "Hit"], "hit or pixel"),
         ("cache-capacity", ["0", "65"], "1 to 64"),
         ("elevation", ["walk", "0"], "inverse or metropolis"),
-        ("reading", ["", "tsai"], "mixture or lobes-alone or chosen-lobe or chosen-pair"),
         ("preset", ["none", "thesis"], "default or strict"),
         ("bounce-candidates", ["0", "17"], "1 to 16"),
         (
@@ -319,12 +318,7 @@ fn every_range_is_named_where_it_is_left() {
 }
 
 #[test]
-fn the_walk_and_all_readings_but_one_are_named_biased() {
-    for reading in ["lobes-alone", "chosen-lobe", "chosen-pair", "weights-before"] {
-        let named = Sampler::Visibility.describe(&parameters(&[&format!("reading={reading}")]));
-        assert_eq!(named["reading"], format!("{reading} (biased)"));
-    }
-    assert_eq!(Sampler::Visibility.describe(&parameters(&[]))["reading"], "mixture");
+fn the_walk_is_named_biased() {
     let named = Sampler::Product.describe(&parameters(&["elevation=metropolis"]));
     assert_eq!(named["elevation"], "metropolis (biased)");
     assert_eq!(Sampler::Visibility.describe(&parameters(&[]))["elevation"], "inverse");

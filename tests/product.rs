@@ -16,15 +16,13 @@ use fenestra::{
     pass::{Kernel, Pass, SceneBuffers, Steps, Surfaces, WaveBuffers, geometry::Traversal},
     sampler::{
         Parameters,
-        product::{Fits, LobeBuffers, LobeOrder, LobeSize, ProductParameters, Reading},
+        product::{Fits, LobeBuffers, LobeOrder, LobeSize, ProductParameters},
         visibility::{Threshold, VisibilityParameters, VisibilitySteps},
     },
     session::{Settings, window_of},
     shader::{
         bindings::{FILM, film},
-        rooms::product::{
-            CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_SHARE, CONSTANT_KEPT_LOBES, CONSTANT_READING,
-        },
+        rooms::product::{CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_SHARE, CONSTANT_KEPT_LOBES},
         rooms::visibility::{
             CONSTANT_CACHE_CAPACITY, CONSTANT_FIXED_THRESHOLD, CONSTANT_THRESHOLD_SCALE,
             CONSTANT_VISIBILITY_EXPONENT,
@@ -36,7 +34,7 @@ use glam::{DVec3, Vec3, dvec3};
 
 use crate::{
     support::{self, PathInput, materials, scenes, statistics},
-    twin::srbf::{kernel_deviation, kernel_hemisphere_part, kernel_pdf},
+    twin::srbf::{kernel_deviation, kernel_hemisphere_part},
 };
 
 /// Samples per path and state of the cache.
@@ -48,8 +46,6 @@ const ROWS: usize = 180;
 const COLUMNS: usize = 360;
 /// Cells of the quadrature along each side of a bin.
 const CELLS_PER_BIN: usize = 10;
-/// Least integral of the smallest density that readings are tested with.
-const LEAST_OVERLAP: f64 = 0.005;
 /// Limit of |z|, exceeded with a chance of 7e-6; 36 are tested.
 const Z_LIMIT: f64 = 4.5;
 
@@ -256,13 +252,11 @@ impl Paths {
     }
 
     /// Returns the passes' specialization constants, for the probes.
-    fn constants(&self) -> [(u32, u32); 8] {
+    fn constants(&self) -> [(u32, u32); 7] {
         let Parameters { product, visibility, .. } = &self.parameters;
-        let [brdf_share, environment_share] = product.shares();
         [
-            (CONSTANT_BRDF_SHARE, brdf_share.to_bits()),
-            (CONSTANT_ENVIRONMENT_SHARE, environment_share.to_bits()),
-            (CONSTANT_READING, product.reading.tag()),
+            (CONSTANT_BRDF_SHARE, product.brdf_share.to_bits()),
+            (CONSTANT_ENVIRONMENT_SHARE, product.environment_share.to_bits()),
             (CONSTANT_KEPT_LOBES, product.kept_lobes),
             (CONSTANT_THRESHOLD_SCALE, visibility.threshold_scale.to_bits()),
             (CONSTANT_FIXED_THRESHOLD, u32::from(visibility.threshold == Threshold::Fixed)),
@@ -602,117 +596,5 @@ fn lobes_are_chosen_by_integral_in_either_order() {
         eprintln!("path {path}: {} lobes, {least} to {most}", scales.len());
         assert!(scales.len() > 8, "path {path}: {} lobes", scales.len());
         assert!(most / least < 1.05, "path {path}: {least} to {most}");
-    }
-}
-
-/// Returns the lobe that a number chooses, with the weights in force; `None` where rounding decides.
-fn chosen_lobe(lobes: &[LobeAnswer], number: f32) -> Option<&LobeAnswer> {
-    let target = f64::from(number) * f64::from(lobes[0].total);
-    let mut sum = 0.0;
-    for lobe in lobes {
-        let before = sum;
-        sum += f64::from(lobe.weight_in_force);
-        if sum > target {
-            let margin = 1e-4 * f64::from(lobes[0].total);
-            return (target - before > margin && sum - target > margin).then_some(lobe);
-        }
-    }
-    None
-}
-
-/// Every reading divides by the density that it names, and its mean deviates as that density predicts,
-/// which is enumerated over the lobes for the integrand 1 / Σ 1 / p_l: at most the density of each lobe,
-/// so that no estimate has a heavy tail.
-#[test]
-fn readings_deviate_as_their_densities_predict() {
-    let visibility = VisibilityParameters::default();
-    let broad = ProductParameters { environment_lobes: 1, brdf_lobes: 3, ..few_lobes() };
-    for reading in [
-        Reading::Mixture,
-        Reading::LobesAlone,
-        Reading::ChosenLobe,
-        Reading::ChosenPair,
-        Reading::WeightsBefore,
-    ] {
-        let (mut tested, mut found) = (0, 0);
-        let paths = Paths::new(ProductParameters { reading, ..broad }, visibility);
-        for index in 0..3 {
-            let directions = paths.draw_lobes(index);
-            paths.learn(&directions.into_iter().map(|to| (to, false)).collect::<Vec<_>>());
-        }
-        let (queries, samples) = paths.samples(SAMPLES, 7);
-        for (path, lobes) in paths.lobes().iter().enumerate() {
-            let density = |lobe: &LobeAnswer, direction: DVec3| {
-                f64::from(kernel_pdf(lobe.axis.into(), lobe.bandwidth, direction.as_vec3()))
-            };
-            let mixture = |weight: fn(&LobeAnswer) -> f32, direction: DVec3| {
-                let weight = |lobe| f64::from(weight(lobe));
-                let sum: f64 = lobes.iter().map(weight).sum();
-                lobes.iter().map(|lobe| weight(lobe) * density(lobe, direction)).sum::<f64>() / sum
-            };
-            let in_force = |direction| mixture(|lobe| lobe.weight_in_force, direction);
-            let before = |direction| mixture(|lobe| lobe.weight, direction);
-            let integrand = |direction: DVec3| {
-                1.0 / lobes.iter().map(|lobe| 1.0 / density(lobe, direction)).sum::<f64>()
-            };
-            let of_path = path * SAMPLES..(path + 1) * SAMPLES;
-            let (queries, samples) = (&queries[of_path.clone()], &samples[of_path]);
-            let name = format!("{reading:?}, path {path}");
-            let integral = |value: &dyn Fn(DVec3) -> f64| {
-                let at = |cell| {
-                    let (theta, phi) = centre(cell);
-                    solid_angle(cell) * value(paths.surfaces[path].to_world(theta, phi))
-                };
-                (0..ROWS * COLUMNS).map(at).sum::<f64>()
-            };
-
-            let mut compared = 0;
-            for (query, answer) in queries.iter().zip(samples).take(500) {
-                let direction = answer.direction();
-                let Some(chosen) = chosen_lobe(lobes, query.lobe) else { continue };
-                let probability = f64::from(chosen.weight_in_force / chosen.total);
-                let expected = match reading {
-                    Reading::Mixture => continue,
-                    Reading::LobesAlone => in_force(direction),
-                    Reading::ChosenLobe => density(chosen, direction),
-                    Reading::ChosenPair => probability * density(chosen, direction),
-                    Reading::WeightsBefore => before(direction),
-                };
-                let ratio = f64::from(answer.pdf) / expected;
-                assert!((ratio - 1.0).abs() < 5e-3, "{name}: {ratio} of {expected}");
-                compared += 1;
-            }
-            assert!(compared > 400 || reading == Reading::Mixture, "{name}: {compared} compared");
-
-            let values: Vec<f64> = samples
-                .iter()
-                .map(|answer| (integrand(answer.direction()), f64::from(answer.pdf)))
-                .map(|(integrand, pdf)| if pdf > 0.0 { integrand / pdf } else { 0.0 })
-                .collect();
-            let truth = integral(&integrand);
-            // Where narrow lobes lie far apart, all of the integral is in their tails.
-            if truth < LEAST_OVERLAP {
-                eprintln!("{name}: {truth:.1e} of overlap");
-                continue;
-            }
-            let expected = match reading {
-                Reading::ChosenPair => lobes.len() as f64 * truth,
-                Reading::WeightsBefore => integral(&|to| integrand(to) * in_force(to) / before(to)),
-                _ => truth,
-            };
-            let z = statistics::z_of_mean(&values, expected);
-            let of_truth = statistics::z_of_mean(&values, truth);
-            let share = expected / truth;
-            eprintln!("{name}: {share:.3} of {truth:.3}, z {z:.2}, of the truth {of_truth:.1}");
-            assert!(z.abs() < Z_LIMIT, "{name}: z = {z}");
-            tested += 1;
-            found += usize::from(of_truth.abs() > Z_LIMIT);
-        }
-        let is_found = match reading {
-            Reading::ChosenPair => found == tested,
-            Reading::WeightsBefore => found > 0,
-            _ => found == 0,
-        };
-        assert!(tested > 0 && is_found, "{reading:?}: {found} of {tested} means are wrong");
     }
 }

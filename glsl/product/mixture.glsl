@@ -4,7 +4,6 @@
 //
 // Deviation: elevations by inversion; the thesis's Metropolis walk is optional, and biased.
 
-#include "product/readings.glsl"
 #include "product/techniques.glsl"
 #include "vertex.glsl"
 #include "visibility/weights.glsl"
@@ -64,7 +63,6 @@ vec3 mixture_sample(Vertex vertex, Mixture mixture, uint ray, MixtureNumbers num
     vec3 direction = draw_beside_product(vertex, mixture.shares, numbers);
     if (is_from_product(mixture.shares, numbers)) {
         uint l = find_lobe(mixture.lobes, numbers.lobe * mixture.total);
-        chosen_lobe = l;
         ProductLobe lobe = unpack_lobe(lobe_words(mixture.lobes, l));
         direction = draw_from_lobe(vertex, ray, lobe, numbers.direction);
     }
@@ -114,9 +112,7 @@ float mixture_lobe_density(Mixture mixture, vec3 direction) {
 
 // Returns the density of the whole mixture where that of the lobes is `lobe_density`.
 float mixture_pdf(Mixture mixture, DirectionSample sampled, float lobe_density) {
-    return shares_pdf(
-        mixture.shares, sampled,
-        read_density(mixture.lobes, mixture.total, sampled.direction, lobe_density));
+    return shares_pdf(mixture.shares, sampled, lobe_density);
 }
 
 // Draws one ray; its contribution is integrand / pdf, without occlusion.

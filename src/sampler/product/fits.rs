@@ -53,9 +53,6 @@ impl Fits {
         if parameters.elevation == Elevation::Metropolis {
             log::warn!("--set elevation=metropolis: a short random walk, so the image is biased");
         }
-        if let Some(reason) = parameters.reading.bias() {
-            log::warn!("--set reading: {reason}, so the image is biased");
-        }
         let start = Instant::now();
         let cache = fit::Cache::user();
         let mut hashes = BTreeMap::new();

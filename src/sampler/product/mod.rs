@@ -14,12 +14,12 @@ use std::collections::BTreeMap;
 
 pub use fits::{FitSizes, Fits};
 pub use lobes::{LobeBuffers, LobeSize};
-pub use parameters::{Elevation, LobeOrder, ProductParameters, Reading};
+pub use parameters::{Elevation, LobeOrder, ProductParameters};
 pub use steps::ProductSteps;
 
 use super::{Context, Parameters, Room, knob::Knobs};
 use crate::{
-    error::{Error, Result},
+    error::Result,
     gpu::DescriptorSet,
     pass::{Passes, PathDemand, PixelReadback, Report, Steps, Technique},
 };
@@ -32,12 +32,6 @@ fn size(parameters: &ProductParameters) -> LobeSize {
 
 impl Room for ProductRoom {
     fn check(&self, parameters: &Parameters, _depth: u32) -> Result<()> {
-        if parameters.product.reading == Reading::WeightsBefore {
-            return Err(Error::usage(
-                "--set reading=weights-before with --sampler product: no cache changes its weights; \
-                 use --sampler visibility, or reading=lobes-alone",
-            ));
-        }
         parameters.product.check()
     }
 

@@ -3,9 +3,6 @@
 use crate::{
     error::{Error, Result},
     sampler::knob::{Values, parameters},
-    shader::rooms::product::{
-        READING_CHOSEN_LOBE, READING_CHOSEN_PAIR, READING_MIXTURE, READING_WEIGHTS_BEFORE,
-    },
 };
 
 /// Order of the lobes of a product for dropping the weakest, and what the others are chosen by.
@@ -32,71 +29,19 @@ pub enum Elevation {
 const ELEVATIONS: &[(&str, Elevation)] =
     &[("inverse", Elevation::Inverse), ("metropolis", Elevation::Metropolis)];
 
-/// Reading of the density that the thesis divides a direction by, `Pr` of its Eq. 2. All but
-/// [`Reading::Mixture`] are biased and for studies alone: they draw from the lobes without shares of
-/// BRDF and environment, which the text does not have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reading {
-    /// Density of the whole mixture of lobes, BRDF and environment.
-    Mixture,
-    /// Density of the mixture of the lobes, which hardly cover the hemisphere.
-    LobesAlone,
-    /// Density of the chosen lobe.
-    ChosenLobe,
-    /// Density of the chosen lobe, times the probability of choosing it.
-    ChosenPair,
-    /// Density of the lobes with their weights before the cache lowered them.
-    WeightsBefore,
-}
+/// Elevations by name; the text of a biased one says so.
+struct Elevations;
 
-const READINGS: &[(&str, Reading)] = &[
-    ("mixture", Reading::Mixture),
-    ("lobes-alone", Reading::LobesAlone),
-    ("chosen-lobe", Reading::ChosenLobe),
-    ("chosen-pair", Reading::ChosenPair),
-    ("weights-before", Reading::WeightsBefore),
-];
-
-impl Reading {
-    /// Explains why the image is biased; `None` where it is not.
-    pub fn bias(self) -> Option<&'static str> {
-        match self {
-            Self::Mixture => None,
-            Self::LobesAlone => Some("lobes alone do not cover the hemisphere"),
-            Self::ChosenLobe => Some("the density of one lobe vanishes where others draw"),
-            Self::ChosenPair => Some("every lobe adds the whole integral"),
-            Self::WeightsBefore => Some("directions are not drawn with the density divided by"),
-        }
+impl Values<Elevation> for Elevations {
+    fn parse(&self, text: &str) -> Result<Elevation, String> {
+        ELEVATIONS.parse(text)
     }
 
-    /// Tag in the shaders, `READING_…`.
-    pub fn tag(self) -> u32 {
-        match self {
-            Self::Mixture | Self::LobesAlone => READING_MIXTURE,
-            Self::ChosenLobe => READING_CHOSEN_LOBE,
-            Self::ChosenPair => READING_CHOSEN_PAIR,
-            Self::WeightsBefore => READING_WEIGHTS_BEFORE,
-        }
+    fn text(&self, value: &Elevation) -> String {
+        let is_biased = *value == Elevation::Metropolis;
+        ELEVATIONS.text(value) + if is_biased { " (biased)" } else { "" }
     }
 }
-
-/// Values of which some bias the image, which their text says too.
-struct MaybeBiased<T: 'static>(&'static [(&'static str, T)], fn(&T) -> bool);
-
-impl<T: Copy + PartialEq> Values<T> for MaybeBiased<T> {
-    fn parse(&self, text: &str) -> Result<T, String> {
-        self.0.parse(text)
-    }
-
-    fn text(&self, value: &T) -> String {
-        self.0.text(value) + if (self.1)(value) { " (biased)" } else { "" }
-    }
-}
-
-const MAYBE_BIASED_ELEVATIONS: MaybeBiased<Elevation> =
-    MaybeBiased(ELEVATIONS, |elevation| *elevation == Elevation::Metropolis);
-const MAYBE_BIASED_READINGS: MaybeBiased<Reading> =
-    MaybeBiased(READINGS, |reading| reading.bias().is_some());
 
 parameters! {
     /// Parameters of `product`, also within `visibility`.
@@ -116,9 +61,7 @@ parameters! {
         /// `environment-share`: share of directions from the environment map.
         "environment-share" environment_share: f32 = 0.25, 0.0..=0.999;
         /// `elevation`: how the elevation within a lobe is drawn; metropolis is biased.
-        "elevation" elevation: Elevation = Elevation::Inverse, MAYBE_BIASED_ELEVATIONS;
-        /// `reading`: density that directions are divided by; all but mixture are biased.
-        "reading" reading: Reading = Reading::Mixture, MAYBE_BIASED_READINGS;
+        "elevation" elevation: Elevation = Elevation::Inverse, Elevations;
     }
 }
 
@@ -135,14 +78,6 @@ impl ProductParameters {
             brdf_share: 0.05,
             environment_share: 0.0,
             ..Self::default()
-        }
-    }
-
-    /// Returns the shares of BRDF and environment: none in biased readings.
-    pub fn shares(&self) -> [f32; 2] {
-        match self.reading {
-            Reading::Mixture => [self.brdf_share, self.environment_share],
-            _ => [0.0; 2],
         }
     }
 

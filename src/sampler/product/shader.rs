@@ -23,21 +23,9 @@ room! {
         CONSTANT_ENVIRONMENT_SHARE;
         /// 1 draws elevations by a random walk, which is biased.
         CONSTANT_METROPOLIS;
-        /// Density that directions from lobes are divided by, `READING_…`.
-        CONSTANT_READING;
     }
 
     constants {
-        // Values of CONSTANT_READING.
-        /// Density of all lobes with their weights in force.
-        READING_MIXTURE = 0;
-        /// Density of the chosen lobe; biased in practice.
-        READING_CHOSEN_LOBE = 1;
-        /// Density of the chosen lobe times its probability; biased.
-        READING_CHOSEN_PAIR = 2;
-        /// Density of all lobes with their weights before the cache lowered them; biased.
-        READING_WEIGHTS_BEFORE = 3;
-
         // Lobes and learned visibility.
         /// Lobes between two sums of their weights; a power of two up to 32.
         LOBES_PER_SUM = 16;

@@ -10,8 +10,7 @@ use crate::{
         rooms::product::{
             CONSTANT_BRDF_LOBES, CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_LOBES,
             CONSTANT_ENVIRONMENT_SHARE, CONSTANT_KEPT_LOBES, CONSTANT_METROPOLIS,
-            CONSTANT_ORDER_BY_COEFFICIENT, CONSTANT_READING, CONSTANT_STRONGEST_ENVIRONMENT_LOBE,
-            CONSTANT_VIEWS,
+            CONSTANT_ORDER_BY_COEFFICIENT, CONSTANT_STRONGEST_ENVIRONMENT_LOBE, CONSTANT_VIEWS,
         },
         structs::Wave,
     },
@@ -45,14 +44,12 @@ impl ProductSteps {
     }
 
     /// Specialization of the passes that draw from the mixture.
-    pub fn mixture_constants(&self) -> [(u32, u32); 4] {
-        let [brdf_share, environment_share] = self.parameters.shares();
+    pub fn mixture_constants(&self) -> [(u32, u32); 3] {
         let walks = self.parameters.elevation == Elevation::Metropolis;
         [
-            (CONSTANT_BRDF_SHARE, brdf_share.to_bits()),
-            (CONSTANT_ENVIRONMENT_SHARE, environment_share.to_bits()),
+            (CONSTANT_BRDF_SHARE, self.parameters.brdf_share.to_bits()),
+            (CONSTANT_ENVIRONMENT_SHARE, self.parameters.environment_share.to_bits()),
             (CONSTANT_METROPOLIS, u32::from(walks)),
-            (CONSTANT_READING, self.parameters.reading.tag()),
         ]
     }
 }
