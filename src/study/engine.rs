@@ -1,14 +1,17 @@
 //! Runs a plan: in each scene the reference, the runs, interleaved over seeds and samplers, and the
 //! overhead rounds. Finished runs are written at once, and those of an earlier study reused.
 
-use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    path::PathBuf,
+    sync::Arc,
+};
 
 use super::{
     contender::Contender,
     folder::Folder,
-    plan::{CheckPlan, Plan, ReferencePlan},
-    reference::{HALF_STEMS, Reference, exposure},
-    reference_check::{self, CheckJob, ReferenceCheck, Verdict},
+    plan::{Plan, ReferencePlan},
+    reference::Reference,
     rule::Rule,
     runs::{Round, Run, StudiedScene},
     surfaces::Surfaces,
@@ -17,12 +20,12 @@ use super::{
 use crate::{
     error::{Error, Result},
     files::write_json,
-    film::{Aov, Image, png::write_preview},
+    film::Aov,
     gpu::Device,
     pass::SceneBuffers,
     sampler::Sampler,
     scene::Scene,
-    session::{Observer, Renderer, Session, Settings, describe, traced_window},
+    session::{Observer, Renderer, Session, Settings, traced_window},
 };
 
 /// Everything a study has measured.
@@ -160,60 +163,6 @@ impl Study<'_> {
         }
     }
 
-    fn reference(&mut self, scene: &Scene, buffers: &mut SharedBuffers<'_>) -> Result<Reference> {
-        let reference = match &self.plan.reference {
-            ReferencePlan::Render { contender, half_spp } => {
-                let settings = self.settings(contender);
-                let metadata = describe(self.device, scene, &settings);
-                let make = &mut || buffers.session(settings.clone());
-                let what = (contender, *half_spp);
-                Reference::render(self.folder, scene, what, &metadata, make, &mut self.watch)?
-            }
-            plan => {
-                let reference = Reference::read(plan, scene)?;
-                // Copy the halves into the folder, so that it holds everything the page needs.
-                for (stem, half) in HALF_STEMS.iter().zip([&reference.first, &reference.second]) {
-                    let image = Image::of_rgb(half.width, half.height, &half.pixels);
-                    image.write_exr(&self.folder.image(&scene.name, stem))?;
-                }
-                reference
-            }
-        };
-        let path = self.folder.image(&scene.name, "reference");
-        let mean = reference.mean();
-        write_preview(&path.with_extension("png"), &mean, exposure(&mean))?;
-        Ok(reference)
-    }
-
-    /// Compares the reference with an independent picture, if the plan has one.
-    fn check_reference(
-        &mut self,
-        scene: &Scene,
-        buffers: &mut SharedBuffers<'_>,
-        reference: &Reference,
-    ) -> Result<Option<ReferenceCheck>> {
-        let plan = &self.plan.reference_check;
-        let check = if let CheckPlan::File(path) = plan {
-            reference_check::read(path, scene, reference)?
-        } else {
-            let Some(contender) = plan.contender(reference.sampler.as_deref()) else {
-                return Ok(None);
-            };
-            let settings = self.settings(&contender);
-            let metadata = describe(self.device, scene, &settings);
-            let folder = self.folder;
-            let job = CheckJob { folder, scene, reference, contender: &contender, metadata };
-            job.execute(&mut || buffers.session(settings.clone()), &mut self.watch)?
-        };
-        let text = format!("{}: {}", scene.name, check.describe());
-        if check.verdict == Verdict::Disagrees {
-            log::warn!("{text}");
-        } else {
-            self.watch.note(&text);
-        }
-        Ok(Some(check))
-    }
-
     /// Renders every run and compares it with the reference.
     fn compare(
         &mut self,
@@ -222,7 +171,7 @@ impl Study<'_> {
         compared: (&Reference, &Surfaces),
         results: &mut Results,
     ) -> Result<()> {
-        let mut sessions: BTreeMap<String, Session> = BTreeMap::new();
+        let mut sessions: BTreeMap<&str, Session> = BTreeMap::new();
         for task in self.plan.tasks() {
             let (rule, seed, contender) = task;
             if let Some(run) = self.finished_run(scene, task)? {
@@ -231,11 +180,10 @@ impl Study<'_> {
                 continue;
             }
             self.watch.check()?;
-            if !sessions.contains_key(&contender.label) {
-                let session = buffers.session(self.settings(contender))?;
-                sessions.insert(contender.label.clone(), session);
-            }
-            let Some(session) = sessions.get_mut(&contender.label) else { continue };
+            let session = match sessions.entry(&contender.label) {
+                Entry::Occupied(entry) => entry.into_mut(),
+                Entry::Vacant(entry) => entry.insert(buffers.session(self.settings(contender))?),
+            };
             let run = self.render_run(scene, compared, task, session)?;
             write_json(&self.run_path(scene, task), &run)?;
             if let Some(last) = run.last() {
@@ -261,7 +209,7 @@ fn mask_settings() -> Settings {
     Settings { sampler, shadow_rays: 1, depth: 1, aovs: vec![Aov::Position], ..Settings::default() }
 }
 
-fn pixels(scene: &Scene) -> f64 {
+pub(super) fn pixels(scene: &Scene) -> f64 {
     f64::from(scene.film.width) * f64::from(scene.film.height)
 }
 

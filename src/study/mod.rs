@@ -2,7 +2,8 @@
 //!
 //! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a
 //! reference in two halves ([`engine`], [`job`], [`rule`], [`mod@reference`], [`reference_check`],
-//! [`own_errors`], [`surfaces`], [`overhead`]), each kept as one of the [`runs`] in the report [`folder`] →
+//! [`halves`], [`own_errors`], [`surfaces`], [`overhead`]), each kept as one of the [`runs`] in the report
+//! [`folder`] →
 //! figures over the seeds ([`summary`], [`quality`], [`statistics`]) → `results.json`, `results.csv`
 //! ([`results`]) and the page ([`report`]). [`metrics`] defines the errors.
 
@@ -12,6 +13,7 @@ pub(crate) mod falsecolour;
 pub mod file;
 mod finished;
 pub mod folder;
+mod halves;
 mod job;
 pub mod metrics;
 pub mod overhead;

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{
     contender::Contender,
-    engine::{SharedBuffers, Study},
+    engine::{SharedBuffers, Study, pixels},
     plan::OverheadPlan,
     runs::{Round, Timing, assignments, distinct},
     statistics::{Interval, median_interval},
@@ -37,8 +37,7 @@ impl Study<'_> {
         let OverheadPlan { baseline, contenders, spp, repetitions } = plan;
         let samplers: Vec<_> = std::iter::once(baseline).chain(contenders).collect();
         let conditions = self.conditions(scene, None)?;
-        let pixels = f64::from(scene.film.width) * f64::from(scene.film.height);
-        let paths_per_round = pixels * f64::from(*spp) * samplers.len() as f64;
+        let paths_per_round = pixels(scene) * f64::from(*spp) * samplers.len() as f64;
         let mut sessions: Vec<Session> = Vec::new();
         let rules = Rules { samples: Some(*spp), ..Rules::default() };
         for repetition in 1..=*repetitions {

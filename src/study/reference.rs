@@ -4,40 +4,28 @@
 //! The reference's own error, that of the mean of the halves, is ¼·mean (r₁ − r₂)², and a sampler
 //! whose error is not well above it is not judged ([`is_judged`](super::own_errors::is_judged)).
 
-use std::{
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
 use super::{
-    contender::Contender,
     folder::Folder,
     metrics::{Metrics, not_finite},
     own_errors::OwnErrors,
     plan::ReferencePlan,
     statistics::{mean_standard_error, percentile},
-    watch::Watch,
 };
 use crate::{
     error::{Error, Result},
     files,
-    film::{
-        Aov, Attribute, Image, Metadata, RgbImage, SampleRange,
-        checkpoint::{checkpoint_path, remove_checkpoint},
-        denoised::check_film,
-    },
+    film::{Attribute, Image, Metadata, RgbImage, denoised::check_film},
     scene::Scene,
-    session::{Rules, Session},
 };
 
 /// File stems of the halves.
 pub(crate) const HALF_STEMS: [&str; 2] = ["reference_1", "reference_2"];
 /// Seeds of the halves; those of runs count up from 1.
 pub const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
-/// Time between checkpoints of a half: even a killed program loses only the passes since the last.
-const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A reference with its own errors.
 #[derive(Clone, Debug)]
@@ -97,7 +85,7 @@ pub(super) fn read_checked(path: &Path, scene: &Scene) -> Result<Image> {
 }
 
 /// Reads the images of a reference and checks that they show the scene.
-fn read_images(paths: Vec<PathBuf>, scene: &Scene) -> Result<Vec<(PathBuf, Image)>> {
+pub(super) fn read_images(paths: Vec<PathBuf>, scene: &Scene) -> Result<Vec<(PathBuf, Image)>> {
     let read = |path: PathBuf| read_checked(&path, scene).map(|image| (path, image));
     paths.into_iter().map(read).collect()
 }
@@ -144,53 +132,14 @@ impl Reference {
         }
         let names: Vec<String> =
             images.iter().map(|(path, _)| path.display().to_string()).collect();
-        Self::from_images(&images, format!("read from {}", names.join(" and ")), scene)
+        Self::of(&images, format!("read from {}", names.join(" and ")), scene)
     }
 
-    /// Renders what `folder` lacks of the two halves and reads both. An interrupted half continues
-    /// from its checkpoint.
-    ///
-    /// `metadata` describes the render without its samples; `make_session` is called only if there
-    /// is something to render.
+    /// Takes one image or two halves, with the errors that they have themselves.
     ///
     /// # Errors
-    /// [`Error::Interrupted`] after the checkpoint has been written; a failing device or disk.
-    pub(crate) fn render(
-        folder: &Folder,
-        scene: &Scene,
-        (contender, half_spp): (&Contender, u32),
-        metadata: &Metadata,
-        make_session: &mut dyn FnMut() -> Result<Session>,
-        watch: &mut Watch<'_>,
-    ) -> Result<Self> {
-        let pixels = f64::from(scene.film.width) * f64::from(scene.film.height);
-        let mut session = None;
-        let paths = HALF_STEMS.map(|stem| folder.image(&scene.name, stem));
-        for (path, seed) in paths.iter().zip(SEEDS) {
-            let range = SampleRange { seed, first: 0, count: half_spp };
-            let metadata = Metadata { sample_ranges: vec![range], ..metadata.clone() };
-            if is_finished(path, &metadata)? {
-                watch.expect(-pixels * f64::from(half_spp), 0.0);
-                continue;
-            }
-            let session = match &mut session {
-                Some(session) => session,
-                none => none.insert(make_session()?),
-            };
-            watch.note(&format!(
-                "{}: reference {} of 2 by {}, {half_spp} spp",
-                scene.name,
-                seed - SEEDS[0] + 1,
-                contender.label
-            ));
-            render_half(session, path, range, watch)?;
-        }
-        let images = read_images(paths.to_vec(), scene)?;
-        let description = format!("{}, two halves of {half_spp} spp", contender.label);
-        Self::from_images(&images, description, scene)
-    }
-
-    fn from_images(
+    /// An image without a picture; [`Error::Comparison`] for a black one.
+    pub(super) fn of(
         images: &[(PathBuf, Image)],
         description: String,
         scene: &Scene,
@@ -253,57 +202,6 @@ impl Reference {
     pub(crate) fn mean(&self) -> RgbImage {
         mean(&self.first, &self.second)
     }
-}
-
-/// Tests whether `path` holds the render that `metadata` describes.
-fn is_finished(path: &Path, metadata: &Metadata) -> Result<bool> {
-    if !path.exists() {
-        return Ok(false);
-    }
-    // Fits are known only to the renderer, and follow from the rest.
-    let fit_hashes = metadata.fit_hashes.clone();
-    let found = Metadata { fit_hashes, ..Metadata::load(&Image::read_exr(path)?, path)? };
-    Ok(found.differences(metadata).is_empty()
-        && found.sample_ranges == metadata.sample_ranges
-        && (&found.device, &found.driver, &found.version)
-            == (&metadata.device, &metadata.driver, &metadata.version))
-}
-
-/// Renders one half, from its checkpoint if there is one of the same render; else, or if that is damaged,
-/// from its first sample.
-fn render_half(
-    session: &mut Session,
-    path: &Path,
-    SampleRange { seed, count, .. }: SampleRange,
-    watch: &mut Watch<'_>,
-) -> Result<()> {
-    let checkpoint = checkpoint_path(path);
-    files::sweep_leftovers(path);
-    session.restart(seed)?;
-    if checkpoint.exists() {
-        let resumed = session.resume(&checkpoint);
-        let is_usable = resumed.is_ok() && session.renderer.sample_count() <= count;
-        match resumed {
-            Err(error @ Error::Vulkan { .. }) => return Err(error),
-            Err(error) => log::warn!("{error}; starting this half again"),
-            Ok(()) => {}
-        }
-        if !is_usable {
-            session.restart(seed)?;
-        }
-    }
-    let [width, height] = session.renderer.film_size().map(f64::from);
-    watch.expect(-width * height * f64::from(session.renderer.sample_count()), 0.0);
-    let checkpoints = Some((checkpoint.clone(), CHECKPOINT_INTERVAL));
-    let rules = Rules { samples: Some(count), checkpoints, ..Rules::default() };
-    let result = watch.run(session, &rules, false);
-    if matches!(result, Err(Error::Interrupted)) && session.renderer.sample_count() > 0 {
-        let written = session.write_checkpoint(&checkpoint, session.renderer.sums()?)?;
-        written.unwrap_or_else(|error| log::warn!("{error}"));
-    }
-    result?;
-    session.image(&[Aov::Variance])?.write_exr(path)?;
-    remove_checkpoint(&checkpoint)
 }
 
 /// Refuses a picture of another size or scene or with values that are not finite.

@@ -10,33 +10,18 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    contender::Contender,
-    folder::Folder,
-    reference::{Reference, read_checked},
-    watch::Watch,
-};
+use super::reference::{Reference, read_checked};
 use crate::{
     error::{Error, Result},
-    film::{Image, Metadata, RgbImage, SampleRange},
+    film::RgbImage,
     scene::Scene,
-    session::{Rules, Session},
 };
 
 /// Time of a check by another sampler, as a share of the reference's.
 pub(crate) const TIME_SHARE: f64 = 0.1;
-/// Samples per pixel of both halves of a check where the reference's time is not known.
-const SPP_WITHOUT_TIME: u32 = 256;
 /// Inflation of the blocks' variance above which neighbours are taken to share paths; for independent
 /// pixels it is 1 ± 0.2.
 const SHARED_FROM: f64 = 2.0;
-/// Samples per pixel of both halves below which a check by a sampler finds no disagreement: a light
-/// that it has not found yet leaves no trace in its noise either.
-const LEAST_SPP: u64 = 32;
-/// File stems of the check's halves.
-const HALF_STEMS: [&str; 2] = ["reference_check_1", "reference_check_2"];
-/// Seeds of the halves; those of the reference lie above, those of runs count up from 1.
-const SEEDS: [u32; 2] = [u32::MAX - 3, u32::MAX - 2];
 /// Blocks across and down, at most.
 const GRID: [usize; 2] = [8, 6];
 /// Least side of a block in pixels, so that its own pixels tell how noisy it is.
@@ -270,100 +255,6 @@ pub(super) fn read(path: &Path, scene: &Scene, reference: &Reference) -> Result<
     let image = read_checked(path, scene)?.rgb(path)?;
     let description = format!("{}, taken as free of noise,", path.display());
     ReferenceCheck::of([&reference.first, &reference.second], [&image, &image], description)
-}
-
-pub(super) struct CheckJob<'a> {
-    pub(super) folder: &'a Folder,
-    pub(super) scene: &'a Scene,
-    pub(super) reference: &'a Reference,
-    pub(super) contender: &'a Contender,
-    /// Describes the render without its samples.
-    pub(super) metadata: Metadata,
-}
-
-impl CheckJob<'_> {
-    /// Renders what the folder lacks and compares; `make` is called only if there is something to
-    /// render.
-    ///
-    /// # Errors
-    /// [`Error::Interrupted`]; a failing device or disk.
-    pub(super) fn execute(
-        self,
-        make: &mut dyn FnMut() -> Result<Session>,
-        watch: &mut Watch<'_>,
-    ) -> Result<ReferenceCheck> {
-        let paths = HALF_STEMS.map(|stem| self.folder.image(&self.scene.name, stem));
-        let found = [self.finished(&paths[0], SEEDS[0])?, self.finished(&paths[1], SEEDS[1])?];
-        let [first, second] = if let [Some(first), Some(second)] = found {
-            [first, second]
-        } else {
-            watch.note(&format!(
-                "{}: check of the reference by {}",
-                self.scene.name, self.contender.label
-            ));
-            let mut session = make()?;
-            let limit = self.reference.own.seconds.map(|seconds| 0.5 * TIME_SHARE * seconds);
-            watch.expect(0.0, 2.0 * limit.unwrap_or(0.0));
-            let spp = limit.is_none().then_some(SPP_WITHOUT_TIME / 2);
-            let first = self.render(&mut session, &paths[0], SEEDS[0], (spp, limit), watch)?;
-            // The second half has as many samples as the first.
-            let spp = Some(first.sample_count);
-            let second = self.render(&mut session, &paths[1], SEEDS[1], (spp, None), watch)?;
-            [first, second]
-        };
-        let spp = u64::from(first.sample_count) + u64::from(second.sample_count);
-        let description = format!("{}, two halves of {} spp,", self.contender.label, spp / 2);
-        let halves = [&self.reference.first, &self.reference.second];
-        let mut check = ReferenceCheck::of(halves, [&first.picture, &second.picture], description)?;
-        if spp < LEAST_SPP {
-            check.verdict = Verdict::TooNoisy;
-        }
-        let seconds = Some(first.seconds + second.seconds);
-        Ok(ReferenceCheck { spp: Some(spp), seconds, ..check })
-    }
-
-    fn finished(&self, path: &Path, seed: u32) -> Result<Option<Half>> {
-        if !path.exists() {
-            return Ok(None);
-        }
-        let image = Image::read_exr(path)?;
-        let found = Metadata::load(&image, path)?;
-        let count = found.sample_ranges.first().map_or(0, |range| range.count);
-        let range = SampleRange { seed, first: 0, count };
-        // Fits are known only to the renderer, and follow from the rest.
-        let fit_hashes = found.fit_hashes.clone();
-        let asked = Metadata { sample_ranges: vec![range], fit_hashes, ..self.metadata.clone() };
-        let is_same = found.differences(&asked).is_empty()
-            && found.sample_ranges == asked.sample_ranges
-            && found.version == asked.version
-            && [image.width, image.height] == [self.scene.film.width, self.scene.film.height];
-        let picture = image.rgb(path)?;
-        let half = Half { picture, sample_count: count, seconds: found.seconds };
-        Ok(is_same.then_some(half))
-    }
-
-    /// Renders one half until it has `spp` samples or its passes have taken the limit.
-    fn render(
-        &self,
-        session: &mut Session,
-        path: &Path,
-        seed: u32,
-        (samples, seconds): (Option<u32>, Option<f64>),
-        watch: &mut Watch<'_>,
-    ) -> Result<Half> {
-        session.restart(seed)?;
-        watch.run(session, &Rules { samples, seconds, ..Rules::default() }, true)?;
-        let image = session.image(&[])?;
-        image.write_exr(path)?;
-        let sample_count = session.renderer.sample_count();
-        Ok(Half { picture: image.rgb(path)?, sample_count, seconds: session.seconds() })
-    }
-}
-
-struct Half {
-    picture: RgbImage,
-    sample_count: u32,
-    seconds: f64,
 }
 
 #[cfg(test)]
