@@ -171,11 +171,7 @@ pub fn run_with<O: Observer>(
 
     let finished = results.runs.len() + results.rounds.len();
     let report = Report::new(&plan, results, end.is_none(), Circumstances::new(&device));
-    let write = || {
-        report.write(&plan, &folder)?;
-        report::write(&report, &plan, &folder)
-    };
-    let written = if finished > 0 { write() } else { Ok(()) };
+    let written = if finished > 0 { report::write(&report, &folder) } else { Ok(()) };
     // Report why the study ended rather than why its report could not be written.
     if let Some(error) = end {
         return Err(error);

@@ -25,8 +25,6 @@ const DEFAULT_SPP: u32 = 64;
 const REFERENCE_FACTOR: u32 = 16;
 /// Least samples of a reference by default.
 const LEAST_REFERENCE_SPP: u32 = 1024;
-/// Title of a study without one.
-const DEFAULT_TITLE: &str = "Comparison of samplers";
 
 /// Options of one layer; absent ones are left to the layers below.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -183,8 +181,6 @@ impl CheckPlan {
 /// Everything a study does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Heading of the report.
-    pub title: String,
     /// Texts and published figures of the study file.
     pub description: Description,
     /// Scene files.
@@ -337,7 +333,6 @@ impl Plan {
             ));
         }
         Ok(Self {
-            title: description.title.clone().unwrap_or_else(|| DEFAULT_TITLE.to_owned()),
             description,
             scenes,
             size: options.size,
@@ -351,6 +346,11 @@ impl Plan {
             reference_check,
             overhead,
         })
+    }
+
+    /// Rules that samplers are compared by: the numbers of samples, ascending, then the time.
+    pub(crate) fn rules(&self) -> Vec<Rule> {
+        self.spp.iter().copied().map(Rule::Spp).chain(self.time.map(Rule::time)).collect()
     }
 
     /// True if errors are compared, which needs a reference.

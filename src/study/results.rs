@@ -12,7 +12,7 @@ use super::{
     quality::{Figure, THRESHOLDS, Time, TimeToQuality, time_of_run, times_to_quality},
     rule::Rule,
     runs::{Measurement, Round, Run, StudiedScene, assignments},
-    summary::{Curve, Summary, curves, rules, summaries},
+    summary::{Curve, Summary, curves, summaries},
 };
 use crate::{
     error::Result,
@@ -20,6 +20,9 @@ use crate::{
     gpu::Device,
     session::Figures,
 };
+
+/// Title of a study without one.
+const DEFAULT_TITLE: &str = "Comparison of samplers";
 
 /// Machine, version and command of a study.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -90,6 +93,9 @@ pub struct Report {
     pub samplers: BTreeMap<String, BTreeMap<String, String>>,
     /// Samplers in the order of the plan.
     pub order: Vec<String>,
+    /// Rules in the order of the plan.
+    #[serde(skip)]
+    pub rules: Vec<Rule>,
     /// Scenes.
     pub scenes: Vec<StudiedScene>,
     /// Figures over the seeds.
@@ -120,7 +126,7 @@ impl Report {
     ) -> Self {
         let baseline = plan.overhead.as_ref().map(|overhead| overhead.baseline.label.clone());
         Self {
-            title: plan.title.clone(),
+            title: plan.description.title.clone().unwrap_or_else(|| DEFAULT_TITLE.to_owned()),
             notes: plan.description.notes.clone(),
             is_complete,
             circumstances,
@@ -133,6 +139,7 @@ impl Report {
                 .map(|contender| (contender.label.clone(), contender.describe_parameters()))
                 .collect(),
             order: plan.contenders.iter().map(|contender| contender.label.clone()).collect(),
+            rules: plan.rules(),
             summaries: summaries(plan, &results.scenes, &results.runs),
             curves: curves(plan, &results.scenes, &results.runs),
             times_to_quality: times_to_quality(plan, &results.scenes, &results.runs),
@@ -150,18 +157,19 @@ impl Report {
     ///
     /// # Errors
     /// [`crate::Error::Io`] with the cause.
-    pub(crate) fn write(&self, plan: &Plan, folder: &Folder) -> Result<()> {
+    pub(crate) fn write(&self, folder: &Folder) -> Result<()> {
         write_json(&folder.path().join("results.json"), self)?;
-        write_text(&folder.path().join("results.csv"), &self.csv(&rules(plan)))
+        write_text(&folder.path().join("results.csv"), &self.csv())
     }
 
     /// Formats a row for every run and rule; columns of figures that a run lacks are empty.
-    fn csv(&self, rules: &[Rule]) -> String {
+    fn csv(&self) -> String {
         let columns = columns(&self.runs);
         let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
         let mut text = names.join(",") + "\n";
         for run in &self.runs {
-            for (rule, measurement) in rules.iter().filter_map(|rule| Some((*rule, run.at(*rule)?)))
+            for (rule, measurement) in
+                self.rules.iter().filter_map(|rule| Some((*rule, run.at(*rule)?)))
             {
                 let fields =
                     columns.iter().map(|(_, field)| quoted(&field(run, rule, measurement)));

@@ -86,6 +86,14 @@ impl Table {
         self.rows.push((starts_group, cells));
     }
 
+    /// Adds rows under one heading, which stands before the first of them, below a line.
+    pub(crate) fn group(&mut self, heading: &str, rows: impl IntoIterator<Item = Vec<String>>) {
+        for (index, mut cells) in rows.into_iter().enumerate() {
+            cells.insert(0, if index == 0 { escape(heading) } else { String::new() });
+            self.row(index == 0, cells);
+        }
+    }
+
     /// Renders the table in a frame that scrolls sideways if it is too wide for the page; nothing
     /// without rows.
     pub(crate) fn html(&self) -> String {

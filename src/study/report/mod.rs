@@ -16,8 +16,8 @@ mod viewer;
 use std::fmt::Write;
 
 use super::{
-    folder::Folder, own_errors::JUDGED_FROM, plan::Plan, reference_check::Verdict, results::Report,
-    rule::Rule, runs::StudiedScene, summary::rules,
+    folder::Folder, own_errors::JUDGED_FROM, reference_check::Verdict, results::Report, rule::Rule,
+    runs::StudiedScene,
 };
 use crate::{error::Result, files::write_text};
 use html::{escape, number};
@@ -27,23 +27,23 @@ use pictures::ScenePictures;
 /// number of samples and of the time.
 const FEW_SAMPLERS: usize = 3;
 
-/// Writes `index.html`.
+/// Writes `results.json`, `results.csv` and `index.html`.
 ///
 /// # Errors
-/// A picture cannot be read, or the page cannot be written.
-pub fn write(report: &Report, plan: &Plan, folder: &Folder) -> Result<()> {
-    let rules = rules(plan);
-    let is_shown = |rule: &Rule| {
-        report.order.len() <= FEW_SAMPLERS
-            || matches!(rule, Rule::Seconds(_))
-            || plan.spp.last().is_some_and(|spp| *rule == Rule::Spp(*spp))
+/// A picture cannot be read, or a file cannot be written.
+pub fn write(report: &Report, folder: &Folder) -> Result<()> {
+    report.write(folder)?;
+    let is_by_samples = |rule: &&Rule| matches!(rule, Rule::Spp(_));
+    let most_samples = report.rules.iter().rfind(is_by_samples);
+    let is_shown = |rule: &&Rule| {
+        report.order.len() <= FEW_SAMPLERS || !is_by_samples(rule) || Some(*rule) == most_samples
     };
-    let shown: Vec<Rule> = rules.iter().copied().filter(is_shown).collect();
+    let shown: Vec<Rule> = report.rules.iter().filter(is_shown).copied().collect();
     let mut body = start(report);
     let mut style = String::new();
     if !report.summaries.is_empty() {
-        let verdicts = verdict::all(report, &rules);
-        let glance = verdicts + &tables::at_a_glance(report, &rules);
+        let verdicts = verdict::all(report);
+        let glance = verdicts + &tables::at_a_glance(report);
         body += &format!("<section id=\"glance\"><h2>At a glance</h2>{glance}</section>");
         body += &section("quality", "Time to quality", "", &tables::times_to_quality(report));
         let about = include_str!("published.html");
@@ -52,11 +52,11 @@ pub fn write(report: &Report, plan: &Plan, folder: &Folder) -> Result<()> {
         for (index, scene) in report.scenes.iter().enumerate() {
             let own = report.summaries.iter().any(|summary| summary.scene == scene.name);
             if scene.reference.is_some() && own {
-                let pictures = pictures::load(folder, scene, &report.order, &shown, &report.runs)?;
+                let pictures = pictures::load(folder, report, scene, &shown)?;
                 for (number, picture) in pictures.pictures.iter().enumerate() {
                     style += &viewer::picture_style(index, number, picture);
                 }
-                body += &scene_section(report, index, scene, &pictures, &rules);
+                body += &scene_section(report, index, scene, &pictures);
             }
         }
     }
@@ -133,7 +133,6 @@ fn scene_section(
     index: usize,
     scene: &StudiedScene,
     pictures: &ScenePictures,
-    rules: &[Rule],
 ) -> String {
     let mut html = format!(
         "<section id=\"scene-{index}\"><h2>{}</h2><p class=\"facts\">{}×{} pixels, {} triangles. ",
@@ -188,13 +187,13 @@ fn scene_section(
             html::percent(1.0 - part.surface_share)
         );
     }
-    let sentence = verdict::of_scene(report, scene, rules);
+    let sentence = verdict::of_scene(report, scene);
     if !sentence.is_empty() {
         let _ = write!(html, "<p class=\"verdict\">{sentence}</p>");
     }
     html += &viewer::picture_group(index, scene, pictures);
     html += &curves::plots(report, scene);
-    html += &tables::figures(report, &scene.name, rules);
+    html += &tables::figures(report, &scene.name);
     html + "</section>"
 }
 

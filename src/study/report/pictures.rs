@@ -13,6 +13,7 @@ use crate::{
         folder::Folder,
         metrics::squared_errors,
         reference::{HALF_STEMS, exposure, mean},
+        results::Report,
         rule::Rule,
         runs::{Run, StudiedScene},
         surfaces::{self, mask},
@@ -71,10 +72,9 @@ const CROP_COUNT: usize = 2;
 /// A picture cannot be read, or an error map cannot be written.
 pub fn load(
     folder: &Folder,
+    report: &Report,
     scene: &StudiedScene,
-    samplers: &[String],
     rules: &[Rule],
-    runs: &[Run],
 ) -> Result<ScenePictures> {
     let read = |stem: &str| {
         let path = folder.image(&scene.name, stem);
@@ -94,11 +94,11 @@ pub fn load(
     let mut maps: Vec<Vec<f64>> = Vec::new();
     let mut error_paths: Vec<PathBuf> = Vec::new();
     for rule in rules {
-        for sampler in samplers {
+        for sampler in &report.order {
             let mut shown = None;
             let (mut sum, mut count) = (vec![0.0; mean.pixels.len()], 0.0);
-            let own = runs.iter().filter(|run| run.scene == scene.name && run.sampler == *sampler);
-            for run in own {
+            let is_own = |run: &&Run| run.scene == scene.name && run.sampler == *sampler;
+            for run in report.runs.iter().filter(is_own) {
                 let Some(name) = run.at(*rule).and_then(|m| m.image.as_ref()) else { continue };
                 let path = folder.path().join(name);
                 let picture = Image::read_exr(&path)?.rgb(&path)?;
@@ -139,7 +139,7 @@ pub fn load(
         picture.error = data_uri(mean.width, mean.height, &colours)?;
         falsecolour::picture(map, mean.width as usize, scale).write_png(path)?;
     }
-    let worth = worth_seeing(&maps, samplers.len(), &is_shown);
+    let worth = worth_seeing(&maps, report.order.len(), &is_shown);
     let crops = choose_crops(&worth, mean.width as usize, mean.height as usize);
     Ok(ScenePictures { pictures, scale, exposure: stops, crops })
 }

@@ -72,7 +72,7 @@ const GLANCES: [Glance; 4] = [
 ];
 
 /// Ratios to the first sampler in every scene.
-pub(crate) fn at_a_glance(report: &Report, rules: &[Rule]) -> String {
+pub(crate) fn at_a_glance(report: &Report) -> String {
     let [first, others @ ..] = &report.order[..] else { return String::new() };
     if others.is_empty() || report.summaries.is_empty() {
         return String::new();
@@ -83,28 +83,19 @@ pub(crate) fn at_a_glance(report: &Report, rules: &[Rule]) -> String {
     // The tables of many samplers are too wide to stand side by side.
     html += if others.len() <= 2 { "<div class=\"side\">" } else { "<div>" };
     for glance in &GLANCES {
-        html += &format!("<div>{}</div>", glance_table(report, rules, (first, others), glance));
+        html += &format!("<div>{}</div>", glance_table(report, (first, others), glance));
     }
     html + "</div>"
 }
 
-fn glance_table(
-    report: &Report,
-    rules: &[Rule],
-    (first, others): (&str, &[String]),
-    glance: &Glance,
-) -> String {
+fn glance_table(report: &Report, (first, others): (&str, &[String]), glance: &Glance) -> String {
     let mut table = Table::new(glance.caption.replace("{first}", &escape(first)), &["scene", "at"]);
     table.columns(others);
     for scene in &report.scenes {
-        let mut is_first = true;
-        for rule in rules {
+        let row = |rule: &Rule| {
             let found: Vec<Option<&Summary>> =
                 others.iter().map(|name| find(report, &scene.name, name, *rule)).collect();
-            if found.iter().all(Option::is_none) {
-                continue;
-            }
-            let name = if is_first { escape(&scene.name) } else { String::new() };
+            let is_there = found.iter().any(Option::is_some);
             let cell = |summary: &Summary| {
                 let ratio = (glance.value)(summary);
                 let is_better = |ratio: &Interval| {
@@ -113,9 +104,9 @@ fn glance_table(
                 ratio_cell(ratio, summary.runs > 1 && ratio.is_some_and(is_better))
             };
             let cells = found.into_iter().map(|summary| summary.map_or_else(String::new, cell));
-            table.row(is_first, [name, rule.describe()].into_iter().chain(cells).collect());
-            is_first = false;
-        }
+            is_there.then(|| std::iter::once(rule.describe()).chain(cells).collect())
+        };
+        table.group(&scene.name, report.rules.iter().filter_map(row));
     }
     table.html()
 }
@@ -133,26 +124,21 @@ pub fn times_to_quality(report: &Report) -> String {
         let mut table = Table::new(caption, &["scene", "down to"]);
         table.columns(&report.order);
         for scene in &report.scenes {
-            let mut is_first = true;
-            for threshold in THRESHOLDS {
+            let row = |threshold: f64| {
                 let is_here = |time: &&TimeToQuality| {
                     (time.scene.as_str(), time.figure) == (scene.name.as_str(), figure)
                         && time.threshold == threshold
                 };
                 let here: Vec<&TimeToQuality> =
                     report.times_to_quality.iter().filter(is_here).collect();
-                if here.is_empty() {
-                    continue;
-                }
-                let first = if is_first { escape(&scene.name) } else { String::new() };
-                let mut cells = vec![first, threshold.to_string()];
-                cells.extend(report.order.iter().map(|name| {
+                let cells = report.order.iter().map(|name| {
                     let own = here.iter().find(|time| time.sampler == *name);
                     own.map_or_else(String::new, |time| time_cell(time))
-                }));
-                table.row(is_first, cells);
-                is_first = false;
-            }
+                });
+                let is_there = !here.is_empty();
+                is_there.then(|| std::iter::once(threshold.to_string()).chain(cells).collect())
+            };
+            table.group(&scene.name, THRESHOLDS.into_iter().filter_map(row));
         }
         html += &table.html();
     }
@@ -264,7 +250,7 @@ fn optional_cell(value: Option<f64>) -> String {
 }
 
 /// Every figure of one scene.
-pub fn figures(report: &Report, scene: &str, rules: &[Rule]) -> String {
+pub fn figures(report: &Report, scene: &str) -> String {
     let own: Vec<&Summary> =
         report.summaries.iter().filter(|summary| summary.scene == scene).collect();
     let names: BTreeSet<&String> =
@@ -296,7 +282,7 @@ pub fn figures(report: &Report, scene: &str, rules: &[Rule]) -> String {
         ],
     );
     table.columns(&names.iter().map(|name| name.replace('_', " ")).collect::<Vec<_>>());
-    for rule in rules {
+    for rule in &report.rules {
         let of_rule: Vec<&&Summary> = own.iter().filter(|summary| summary.rule == *rule).collect();
         for (index, summary) in of_rule.into_iter().enumerate() {
             let relative = |value: f64| judged_cell(value, summary.relmse_judged);

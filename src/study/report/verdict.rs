@@ -9,11 +9,11 @@ use crate::study::{
     statistics::Interval, summary::Summary,
 };
 
-pub(super) fn all(report: &Report, rules: &[Rule]) -> String {
+pub(super) fn all(report: &Report) -> String {
     let items: String = report
         .scenes
         .iter()
-        .map(|scene| (scene, of_scene(report, scene, rules)))
+        .map(|scene| (scene, of_scene(report, scene)))
         .filter(|(_, sentence)| !sentence.is_empty())
         .map(|(scene, sentence)| format!("<li><b>{}</b>: {sentence}</li>", escape(&scene.name)))
         .collect();
@@ -28,8 +28,8 @@ pub(super) fn all(report: &Report, rules: &[Rule]) -> String {
 
 /// The verdict of one scene, at equal time if the study has that, else at its most samples; empty
 /// if there is nothing to compare.
-pub(crate) fn of_scene(report: &Report, scene: &StudiedScene, rules: &[Rule]) -> String {
-    let ([first, others @ ..], Some(rule)) = (&report.order[..], rules.last()) else {
+pub(crate) fn of_scene(report: &Report, scene: &StudiedScene) -> String {
+    let ([first, others @ ..], Some(rule)) = (&report.order[..], report.rules.last()) else {
         return String::new();
     };
     let found: Vec<&Summary> =

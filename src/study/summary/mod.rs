@@ -89,17 +89,12 @@ impl Summary {
     }
 }
 
-/// Lists the rules of a plan that summaries are made for.
-pub fn rules(plan: &Plan) -> Vec<Rule> {
-    plan.spp.iter().copied().map(Rule::Spp).chain(plan.time.map(Rule::time)).collect()
-}
-
 /// Summarises runs in the plan's order of scenes, rules and samplers; leaves out samplers without a
 /// finished run.
 pub fn summaries(plan: &Plan, scenes: &[StudiedScene], runs: &[Run]) -> Vec<Summary> {
     let mut all = Vec::new();
     for scene in scenes {
-        for rule in rules(plan) {
+        for rule in plan.rules() {
             let first = plan.contenders.first();
             let baseline = first.map(|first| pairs(runs, &scene.name, &first.label, rule));
             for contender in &plan.contenders {
