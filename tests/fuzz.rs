@@ -10,7 +10,6 @@
 use std::{fs, path::Path};
 
 use fenestra::{
-    command::options::{parse_duration, parse_size},
     film::Checkpoint,
     fit::{EnvironmentOptions, Fit, Method, environment_lobes, read_fit, write_fit},
     sampler::{
@@ -18,9 +17,10 @@ use fenestra::{
         guided::{ARRIVAL_DIRECTIONS, Arm, GuideState, Origin, SHARE_WORDS},
     },
     scene::{EnvironmentMap, files::hexadecimal},
+    session::{parse_duration, parse_size},
     study::{
         contender::Contender,
-        file::{StudyFile, ValueParsers, is_study},
+        file::{StudyFile, is_study},
     },
 };
 use glam::Vec3;
@@ -109,8 +109,7 @@ fn fit() -> Vec<u8> {
 }
 
 fn study(path: &Path, _: &[u8]) -> bool {
-    let parsers = ValueParsers { duration: parse_duration, size: parse_size };
-    is_study(path).is_ok() & StudyFile::load(path, Parameters::default(), parsers).is_ok()
+    is_study(path).is_ok() & StudyFile::load(path, Parameters::default()).is_ok()
 }
 
 fn options(_: &Path, bytes: &[u8]) -> bool {

@@ -5,12 +5,11 @@
 use std::{fs, path::Path, process::Command};
 
 use fenestra::{
-    command::options::{parse_duration, parse_size},
     film::{Attribute, Checkpoint, Image, Metadata},
     sampler::Parameters,
     scene::Scene,
     study::{
-        file::{StudyFile, ValueParsers, is_study},
+        file::{StudyFile, is_study},
         metrics::Metrics,
         plan::{Options, Plan},
     },
@@ -469,7 +468,6 @@ fn a_study_file_gives_scenes_and_settings() {
 
 #[test]
 fn the_studies_that_ship_can_be_run() {
-    let parsers = ValueParsers { duration: parse_duration, size: parse_size };
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/studies");
     let mut count = 0;
     for entry in fs::read_dir(folder).unwrap() {
@@ -479,8 +477,8 @@ fn the_studies_that_ship_can_be_run() {
             continue;
         }
         count += 1;
-        let study = StudyFile::load(&path, Parameters::default(), parsers)
-            .unwrap_or_else(|error| panic!("{error}"));
+        let study =
+            StudyFile::load(&path, Parameters::default()).unwrap_or_else(|error| panic!("{error}"));
         for scene in &study.scenes {
             assert!(scene.exists(), "{}: {}", path.display(), scene.display());
         }

@@ -4,10 +4,7 @@ use std::{collections::BTreeMap, path::PathBuf, sync::Arc, time::Instant};
 
 use serde::Serialize;
 
-use super::{
-    options::{DeviceOptions, parse_size},
-    print_line,
-};
+use super::{options::DeviceOptions, print_line};
 use crate::{
     accel::Accel,
     bench::{RateSpread, RayPlan, RayRate, measure},
@@ -16,7 +13,7 @@ use crate::{
     pass::{SceneBuffers, geometry::triangle_page_bytes},
     sampler::{Sampler, basic},
     scene::Scene,
-    session::{Renderer, Settings, window_of},
+    session::{Renderer, Settings, parse_size, window_of},
     shader::constants::FILM_BLOCK,
 };
 

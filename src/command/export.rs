@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::options::parse_size;
 use crate::{
     error::{Error, Result},
     export::{Settings, gltf, mitsuba, pbrt},
     files,
     scene::Scene,
+    session::parse_size,
 };
 
 /// Arguments of `export`.

@@ -4,7 +4,6 @@ use std::{
     path::{Path, PathBuf},
     str::FromStr,
     sync::Arc,
-    time::Duration,
 };
 
 use super::self_test;
@@ -141,39 +140,6 @@ pub(crate) fn check_strict(strict: bool, scene: &Scene) -> Result<()> {
     Err(Error::scene(&scene.path, format!("--strict: {count} warnings:\n  {list}")))
 }
 
-/// Parses `500ms`, `30s`, `5m`, `1h`, or plain seconds.
-pub fn parse_duration(text: &str) -> Result<Duration, String> {
-    let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
-    let (number, unit) = text.split_at(split);
-    let factor = match unit {
-        "ms" => 1e-3,
-        "" | "s" => 1.0,
-        "m" | "min" => 60.0,
-        "h" => 3600.0,
-        _ => {
-            return Err(format!(
-                "expected a duration such as 30s, 500ms, 5m or 1h, found {text:?}"
-            ));
-        }
-    };
-    number
-        .trim()
-        .parse::<f64>()
-        .ok()
-        .filter(|number| *number > 0.0)
-        .and_then(|number| Duration::try_from_secs_f64(number * factor).ok())
-        .filter(|duration| !duration.is_zero())
-        .ok_or_else(|| format!("expected a positive duration such as 30s, found {text:?}"))
-}
-
-/// Parses `640x480`; each side 1 to 16384.
-pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
-    let side = |side: &str| side.parse().ok().filter(|side| (1..=16384).contains(side));
-    text.split_once(['x', 'X'])
-        .and_then(|(width, height)| Some([side(width)?, side(height)?]))
-        .ok_or_else(|| format!("expected WIDTHxHEIGHT, each 1 to 16384, found {text:?}"))
-}
-
 /// Parses so many numbers between commas.
 fn parse_numbers<T: FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
     let numbers = text.split(',').map(|part| part.trim().parse().ok());
@@ -208,26 +174,6 @@ fn parse_point(text: &str) -> Result<[f32; 3], String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn durations_have_units() {
-        assert_eq!(parse_duration("500ms"), Ok(Duration::from_millis(500)));
-        assert_eq!(parse_duration("30s"), Ok(Duration::from_secs(30)));
-        assert_eq!(parse_duration("30"), Ok(Duration::from_secs(30)));
-        assert_eq!(parse_duration("1.5m"), Ok(Duration::from_secs(90)));
-        assert_eq!(parse_duration("1h"), Ok(Duration::from_secs(3600)));
-        for wrong in ["", "s", "0s", "-1s", "1d", "1e400s", "nan", "NaNs"] {
-            assert!(parse_duration(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
-    fn sizes_are_bounded() {
-        assert_eq!(parse_size("640x480"), Ok([640, 480]));
-        for wrong in ["640", "0x480", "640x", "640x99999", "640x-1", "axb"] {
-            assert!(parse_size(wrong).is_err(), "{wrong}");
-        }
-    }
 
     #[test]
     fn points_have_three_coordinates() {

@@ -7,10 +7,7 @@ use std::{
 
 use super::{
     interrupt::Interrupt,
-    options::{
-        CAMERA, DeviceOptions, MACHINE, OUTPUT, SAMPLING, SCENE, STOPPING, check_strict,
-        parse_duration, parse_size,
-    },
+    options::{CAMERA, DeviceOptions, MACHINE, OUTPUT, SAMPLING, SCENE, STOPPING, check_strict},
     progress::Progress,
     render::Display,
 };
@@ -18,11 +15,11 @@ use crate::{
     error::{Error, Result},
     sampler::Parameters,
     scene::Scene,
-    session::{Observer, Standing},
+    session::{Observer, Standing, parse_duration, parse_size},
     study::{
         contender::Contender,
         engine,
-        file::{StudyFile, ValueParsers, is_study},
+        file::{StudyFile, is_study},
         folder::Folder,
         plan::{CheckPlan, Description, Options, Plan},
         report,
@@ -190,14 +187,13 @@ pub fn run_with<O: Observer>(
 fn plan(arguments: &Arguments) -> Result<Plan> {
     let mut defaults = Parameters::default();
     arguments.set.iter().try_for_each(|assignment| defaults.set(assignment))?;
-    let parsers = ValueParsers { duration: parse_duration, size: parse_size };
     let mut scenes = Vec::new();
     let mut study: Option<StudyFile> = None;
     for input in &arguments.inputs {
         if !is_study(input)? {
             scenes.push(input.clone());
         } else if study.is_none() {
-            study = Some(StudyFile::load(input, defaults, parsers)?);
+            study = Some(StudyFile::load(input, defaults)?);
         } else {
             return Err(Error::usage(format!(
                 "{}: expected one study file at most, found another",

@@ -3,9 +3,7 @@
 use std::path::PathBuf;
 
 use super::{
-    options::{
-        CAMERA, DeviceOptions, MACHINE, OUTPUT, SAMPLING, STOPPING, SceneOptions, parse_size,
-    },
+    options::{CAMERA, DeviceOptions, MACHINE, OUTPUT, SAMPLING, STOPPING, SceneOptions},
     progress::Patience,
     self_test,
 };
@@ -14,7 +12,7 @@ use crate::{
     film::{Curve, Tone},
     sampler::{Parameters, Sampler},
     scene::Asked,
-    session::{DEFAULT_DEPTH, Settings},
+    session::{DEFAULT_DEPTH, Settings, parse_size},
     view::{Display, Options},
 };
 

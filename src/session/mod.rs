@@ -20,5 +20,5 @@ pub use figures::Figures;
 pub use renderer::Renderer;
 pub(crate) use run::describe;
 pub use run::{Event, Observer, Session};
-pub use settings::{DEFAULT_DEPTH, Settings, traced_window, window_of};
-pub use stop::{Flag, Limit, Quality, Rules, Standing, StopReason};
+pub use settings::{DEFAULT_DEPTH, Settings, parse_size, traced_window, window_of};
+pub use stop::{Flag, Limit, Quality, Rules, Standing, StopReason, parse_duration};

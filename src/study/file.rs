@@ -20,10 +20,7 @@
 //! values = { product = 0.127465, visibility = 0.091346 }
 //! ```
 
-use std::{
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use toml::{Spanned, de::DeTable};
@@ -36,6 +33,7 @@ use crate::{
     error::{Error, Result, TextError},
     files::{extension, read_text},
     sampler::Parameters,
+    session::{parse_duration, parse_size},
 };
 
 /// Parsed study file.
@@ -49,15 +47,6 @@ pub struct StudyFile {
     pub settings: Options,
     /// `[quick]`.
     pub quick: Options,
-}
-
-/// Parsers of option values, shared with the command line.
-#[derive(Clone, Copy)]
-pub struct ValueParsers {
-    /// `30s`.
-    pub duration: fn(&str) -> Result<Duration, String>,
-    /// `160x120`.
-    pub size: fn(&str) -> Result<[u32; 2], String>,
 }
 
 #[derive(Deserialize)]
@@ -132,18 +121,13 @@ impl StudyFile {
     /// # Errors
     /// The file cannot be read, or [`Error::Parse`] with line and column: text that is no TOML, an
     /// unknown key, an unknown sampler, a value out of range.
-    pub fn load(path: &Path, defaults: Parameters, parsers: ValueParsers) -> Result<Self> {
+    pub fn load(path: &Path, defaults: Parameters) -> Result<Self> {
         let text = read_text(path)?;
-        Self::parse(&text, path.parent().unwrap_or(Path::new("")), defaults, parsers)
+        Self::parse(&text, path.parent().unwrap_or(Path::new("")), defaults)
             .map_err(|failure| failure.locate(path, &text))
     }
 
-    fn parse(
-        text: &str,
-        folder: &Path,
-        defaults: Parameters,
-        parsers: ValueParsers,
-    ) -> Result<Self, TextError> {
+    fn parse(text: &str, folder: &Path, defaults: Parameters) -> Result<Self, TextError> {
         let root: Root = toml::from_str(text)?;
         Ok(Self {
             scenes: root.scenes.into_inner().iter().map(|scene| folder.join(scene)).collect(),
@@ -153,8 +137,8 @@ impl StudyFile {
                 published_errors: root.published.errors,
                 published_overheads: root.published.overheads,
             },
-            settings: root.settings.into_options(folder, defaults, parsers)?,
-            quick: root.quick.into_options(folder, defaults, parsers)?,
+            settings: root.settings.into_options(folder, defaults)?,
+            quick: root.quick.into_options(folder, defaults)?,
         })
     }
 }
@@ -173,12 +157,7 @@ fn read<T, V>(
 }
 
 impl Entries {
-    fn into_options(
-        self,
-        folder: &Path,
-        defaults: Parameters,
-        parsers: ValueParsers,
-    ) -> Result<Options, TextError> {
+    fn into_options(self, folder: &Path, defaults: Parameters) -> Result<Options, TextError> {
         let contender =
             |text: &String| Contender::parse(text, defaults).map_err(|error| error.to_string());
         Ok(Options {
@@ -187,9 +166,9 @@ impl Entries {
                     .map_err(|error| error.to_string())
             })?,
             spp: self.spp,
-            time: read(self.time, |text| (parsers.duration)(text))?,
+            time: read(self.time, |text| parse_duration(text))?,
             seeds: self.seeds,
-            size: read(self.size, |text| (parsers.size)(text))?,
+            size: read(self.size, |text| parse_size(text))?,
             shadow_rays: self.shadow_rays,
             depth: self.depth,
             reference_sampler: read(self.reference_sampler, contender)?,
@@ -209,13 +188,13 @@ impl Entries {
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
+    use std::time::Duration;
+
     use super::*;
     use crate::sampler::Sampler;
 
     fn parse(text: &str) -> Result<StudyFile> {
-        let parsers =
-            ValueParsers { duration: |_| Ok(Duration::from_secs(30)), size: |_| Ok([160, 120]) };
-        StudyFile::parse(text, Path::new("studies"), Parameters::default(), parsers)
+        StudyFile::parse(text, Path::new("studies"), Parameters::default())
             .map_err(|failure| failure.locate(Path::new("study.toml"), text))
     }
 

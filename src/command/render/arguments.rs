@@ -8,7 +8,7 @@ use std::{
 use super::{
     super::options::{
         CAMERA, DeviceOptions, FILES, MACHINE, OUTPUT, SAMPLING, STOPPING, SceneOptions,
-        parse_crop, parse_duration, parse_pixel, parse_size,
+        parse_crop, parse_pixel,
     },
     QUICK_SPP,
     frames::{Frames, numbered, parse_frames},
@@ -20,7 +20,7 @@ use crate::{
     pass::Roulette,
     sampler::{Parameters, Sampler},
     scene::{Asked, FilmSettings, Scene, load::scene_name},
-    session::{DEFAULT_DEPTH, Quality, Rules, Settings},
+    session::{DEFAULT_DEPTH, Quality, Rules, Settings, parse_duration, parse_size},
 };
 
 /// Arguments of `render`.
