@@ -54,7 +54,7 @@ pub(crate) fn run(
     observer: &mut dyn Observer,
     redo: bool,
 ) -> Result<(Results, Option<Error>)> {
-    let mut study = Study { plan, folder, device, watch: Watch::new(observer) };
+    let mut study = Study { plan, folder, device, watch: Watch::new(observer), buffers: None };
     let scenes = study.load_scenes()?;
     let inputs = scenes.iter().flat_map(|scene| &scene.inputs).map(PathBuf::as_path);
     folder.check_replaces_nothing(&inputs.collect::<Vec<_>>())?;
@@ -77,6 +77,8 @@ pub(super) struct Study<'a> {
     pub(super) folder: &'a Folder,
     pub(super) device: &'a Arc<Device>,
     pub(super) watch: Watch<'a>,
+    /// Device buffers of the scene at work, created when its first session needs them.
+    buffers: Option<Arc<SceneBuffers>>,
 }
 
 impl Study<'_> {
@@ -125,7 +127,7 @@ impl Study<'_> {
     }
 
     fn run_scene(&mut self, scene: &Scene, results: &mut Results) -> Result<()> {
-        let mut buffers = SharedBuffers { device: self.device, scene, made: None };
+        self.buffers = None;
         results.scenes.push(StudiedScene {
             name: scene.name.clone(),
             path: scene.path.display().to_string(),
@@ -137,20 +139,35 @@ impl Study<'_> {
         });
         if self.plan.compares() {
             let studied = results.scenes.len() - 1;
-            let reference = self.reference(scene, &mut buffers)?;
+            let reference = self.reference(scene)?;
             results.scenes[studied].reference = Some(reference.own.clone());
-            let check = self.check_reference(scene, &mut buffers, &reference)?;
+            let check = self.check_reference(scene, &reference)?;
             results.scenes[studied].reference_check = check;
-            let make = &mut || buffers.session(mask_settings());
-            let surfaces = Surfaces::of(self.folder, scene, &reference, make)?;
+            let folder = self.folder;
+            let make = || self.session(scene, mask_settings());
+            let surfaces = Surfaces::of(folder, scene, &reference, make)?;
             results.scenes[studied].parts = Some(surfaces.own);
-            self.compare(scene, &mut buffers, (&reference, &surfaces), results)?;
+            self.compare(scene, (&reference, &surfaces), results)?;
         }
         if let Some(overhead) = &self.plan.overhead {
-            self.measure_overhead(overhead, scene, &mut buffers, &mut results.rounds)?;
+            self.measure_overhead(overhead, scene, &mut results.rounds)?;
         }
         self.device.save_pipeline_cache();
         Ok(())
+    }
+
+    /// Prepares to render the scene at work.
+    pub(super) fn session(&mut self, scene: &Scene, settings: Settings) -> Result<Session> {
+        let buffers = match &mut self.buffers {
+            Some(buffers) => buffers,
+            none => {
+                let window = traced_window(&settings, scene);
+                none.insert(Arc::new(SceneBuffers::new(self.device, scene, window)?))
+            }
+        };
+        let buffers = Arc::clone(buffers);
+        let renderer = Renderer::with_scene_buffers(self.device, buffers, scene, settings)?;
+        Ok(Session::of(renderer, self.device, scene))
     }
 
     pub(super) fn settings(&self, contender: &Contender) -> Settings {
@@ -167,7 +184,6 @@ impl Study<'_> {
     fn compare(
         &mut self,
         scene: &Scene,
-        buffers: &mut SharedBuffers<'_>,
         compared: (&Reference, &Surfaces),
         results: &mut Results,
     ) -> Result<()> {
@@ -182,7 +198,9 @@ impl Study<'_> {
             self.watch.check()?;
             let session = match sessions.entry(&contender.label) {
                 Entry::Occupied(entry) => entry.into_mut(),
-                Entry::Vacant(entry) => entry.insert(buffers.session(self.settings(contender))?),
+                Entry::Vacant(entry) => {
+                    entry.insert(self.session(scene, self.settings(contender))?)
+                }
             };
             let run = self.render_run(scene, compared, task, session)?;
             write_json(&self.run_path(scene, task), &run)?;
@@ -218,28 +236,5 @@ fn expect_run(watch: &mut Watch<'_>, rule: Rule, pixels: f64, count: f64) {
     match rule {
         Rule::Spp(spp) => watch.expect(count * pixels * f64::from(spp), 0.0),
         Rule::Seconds(seconds) => watch.expect(0.0, count * seconds),
-    }
-}
-
-/// Device buffers of a scene, created when the first session needs them.
-pub(super) struct SharedBuffers<'a> {
-    device: &'a Arc<Device>,
-    scene: &'a Scene,
-    made: Option<Arc<SceneBuffers>>,
-}
-
-impl SharedBuffers<'_> {
-    pub(super) fn session(&mut self, settings: Settings) -> Result<Session> {
-        let buffers = match &self.made {
-            Some(buffers) => Arc::clone(buffers),
-            None => {
-                let window = traced_window(&settings, self.scene);
-                let buffers = Arc::new(SceneBuffers::new(self.device, self.scene, window)?);
-                self.made = Some(Arc::clone(&buffers));
-                buffers
-            }
-        };
-        let renderer = Renderer::with_scene_buffers(self.device, buffers, self.scene, settings)?;
-        Ok(Session::of(renderer, self.device, self.scene))
     }
 }

@@ -4,7 +4,7 @@ use std::{path::Path, time::Duration};
 
 use super::{
     contender::Contender,
-    engine::{SharedBuffers, Study, pixels},
+    engine::{Study, pixels},
     plan::{CheckPlan, ReferencePlan},
     reference::{HALF_STEMS, Reference, SEEDS, exposure, read_images},
     reference_check::{self, ReferenceCheck, TIME_SHARE, Verdict},
@@ -36,14 +36,10 @@ const LEAST_SPP: u64 = 32;
 
 impl Study<'_> {
     /// Renders or reads the reference of a scene and writes the pictures of it that the page needs.
-    pub(super) fn reference(
-        &mut self,
-        scene: &Scene,
-        buffers: &mut SharedBuffers<'_>,
-    ) -> Result<Reference> {
+    pub(super) fn reference(&mut self, scene: &Scene) -> Result<Reference> {
         let reference = match &self.plan.reference {
             ReferencePlan::Render { contender, half_spp } => {
-                self.render_reference(scene, buffers, (contender, *half_spp))?
+                self.render_reference(scene, (contender, *half_spp))?
             }
             plan => {
                 let reference = Reference::read(plan, scene)?;
@@ -69,7 +65,6 @@ impl Study<'_> {
     fn render_reference(
         &mut self,
         scene: &Scene,
-        buffers: &mut SharedBuffers<'_>,
         (contender, half_spp): (&Contender, u32),
     ) -> Result<Reference> {
         let settings = self.settings(contender);
@@ -88,7 +83,7 @@ impl Study<'_> {
             }
             let session = match &mut session {
                 Some(session) => session,
-                none => none.insert(buffers.session(settings.clone())?),
+                none => none.insert(self.session(scene, settings.clone())?),
             };
             self.watch.note(&format!(
                 "{}: reference {} of 2 by {}, {half_spp} spp",
@@ -143,7 +138,6 @@ impl Study<'_> {
     pub(super) fn check_reference(
         &mut self,
         scene: &Scene,
-        buffers: &mut SharedBuffers<'_>,
         reference: &Reference,
     ) -> Result<Option<ReferenceCheck>> {
         let plan = &self.plan.reference_check;
@@ -153,7 +147,7 @@ impl Study<'_> {
             let Some(contender) = plan.contender(reference.sampler.as_deref()) else {
                 return Ok(None);
             };
-            self.render_check(scene, buffers, reference, &contender)?
+            self.render_check(scene, reference, &contender)?
         };
         let text = format!("{}: {}", scene.name, check.describe());
         if check.verdict == Verdict::Disagrees {
@@ -171,7 +165,6 @@ impl Study<'_> {
     fn render_check(
         &mut self,
         scene: &Scene,
-        buffers: &mut SharedBuffers<'_>,
         reference: &Reference,
         contender: &Contender,
     ) -> Result<ReferenceCheck> {
@@ -192,7 +185,7 @@ impl Study<'_> {
         } else {
             self.watch
                 .note(&format!("{}: check of the reference by {}", scene.name, contender.label));
-            let mut session = buffers.session(settings)?;
+            let mut session = self.session(scene, settings)?;
             let limit = reference.own.seconds.map(|seconds| 0.5 * TIME_SHARE * seconds);
             self.watch.expect(0.0, 2.0 * limit.unwrap_or(0.0));
             let mut render = |half: usize, samples: Option<u32>, seconds: Option<f64>| {

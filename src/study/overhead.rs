@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{
     contender::Contender,
-    engine::{SharedBuffers, Study, pixels},
+    engine::{Study, pixels},
     plan::OverheadPlan,
     runs::{Round, Timing, assignments, distinct},
     statistics::{Interval, median_interval},
@@ -31,7 +31,6 @@ impl Study<'_> {
         &mut self,
         plan: &OverheadPlan,
         scene: &Scene,
-        buffers: &mut SharedBuffers<'_>,
         rounds: &mut Vec<Round>,
     ) -> Result<()> {
         let OverheadPlan { baseline, contenders, spp, repetitions } = plan;
@@ -48,7 +47,7 @@ impl Study<'_> {
             }
             if sessions.is_empty() {
                 for sampler in &samplers {
-                    let mut session = buffers.session(self.settings(sampler))?;
+                    let mut session = self.session(scene, self.settings(sampler))?;
                     // Render until the size of the waves has settled.
                     self.watch.run(&mut session, &rules, false)?;
                     sessions.push(session);

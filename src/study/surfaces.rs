@@ -52,7 +52,7 @@ impl Surfaces {
         folder: &Folder,
         scene: &Scene,
         reference: &Reference,
-        make: &mut dyn FnMut() -> Result<Session>,
+        make: impl FnOnce() -> Result<Session>,
     ) -> Result<Self> {
         let path = folder.image(&scene.name, STEM);
         let hash = Attribute::Text(scene.hash.clone());
