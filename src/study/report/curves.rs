@@ -83,9 +83,8 @@ fn plot_figure(
     let mut all = Vec::new();
     for (style, curve) in curves {
         let point = |point: &CurvePoint| {
-            let y = (ordinate.value)(point)?;
-            let x = (abscissa.value)(point);
-            Some(plot::Point { x, y: y.middle, low: y.low, high: y.high, label: String::new() })
+            let (x, y) = ((abscissa.value)(point), (ordinate.value)(point)?);
+            Some(plot::Point { x, y, label: String::new() })
         };
         let points: Vec<plot::Point> = curve.points.iter().filter_map(point).collect();
         if points.is_empty() {

@@ -6,7 +6,7 @@ use super::{
     plot::{self, STYLE_COUNT, Series},
     tables,
 };
-use crate::study::{overhead::Overhead, results::Report, runs::distinct, statistics::Interval};
+use crate::study::{overhead::Overhead, plan::PublishedOverhead, results::Report, runs::distinct};
 
 /// Overhead against the share of blocked rays, and the tables.
 pub(crate) fn overhead_section(report: &Report) -> String {
@@ -17,10 +17,9 @@ pub(crate) fn overhead_section(report: &Report) -> String {
     };
     let more = |ratio: f64| 100.0 * (ratio - 1.0);
     let point = |overhead: &Overhead| {
-        let Interval { middle: y, low, high } = overhead.total.map(more);
         let is_labelled = overhead.sampler == samplers[0];
         let label = if is_labelled { overhead.scene.clone() } else { String::new() };
-        Some(plot::Point { x: 100.0 * overhead.blocked_share?, y, low, high, label })
+        Some(plot::Point { x: 100.0 * overhead.blocked_share?, y: overhead.total.map(more), label })
     };
     let series_of = |sampler: &&str| {
         let own = report.overheads.iter().filter(|overhead| overhead.sampler == *sampler);
@@ -28,14 +27,9 @@ pub(crate) fn overhead_section(report: &Report) -> String {
         Series { style: style_of(sampler), name: (*sampler).to_owned(), points }
     };
     let series: Vec<Series> = samplers.iter().map(series_of).collect();
-    let ranges: Vec<plot::Range> = report
-        .published_overheads
-        .iter()
-        .map(|published| plot::Range {
-            label: published.label.clone(),
-            low: more(published.low),
-            high: more(published.high),
-        })
+    let published = report.published_overheads.iter();
+    let ranges: Vec<(&str, [f64; 2])> = published
+        .map(|PublishedOverhead { label, low, high }| (label.as_str(), [more(*low), more(*high)]))
         .collect();
     let legend: String =
         samplers.iter().map(|sampler| legend_entry(style_of(sampler), &escape(sampler))).collect();

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::html::{escape, number};
+use crate::study::statistics::Interval;
 
 const WIDTH: f64 = 460.0;
 const HEIGHT: f64 = 330.0;
@@ -19,11 +20,7 @@ pub(crate) struct Point {
     /// Abscissa.
     pub x: f64,
     /// Ordinate.
-    pub y: f64,
-    /// Lower end of the ordinate's interval.
-    pub low: f64,
-    /// Upper end of the ordinate's interval.
-    pub high: f64,
+    pub y: Interval,
     /// Text at the point; empty for none.
     pub label: String,
 }
@@ -184,10 +181,10 @@ fn mark(frame: &Frame, series: &Series, point: &Point) -> String {
     format!(
         "<g class=\"mark\" transform=\"translate({:.1} {:.1})\"><title>{}: {}, {}</title>{}</g>",
         frame.x(point.x),
-        frame.y(point.y),
+        frame.y(point.y.middle),
         escape(&series.name),
         number(point.x, 3),
-        number(point.y, 3),
+        number(point.y.middle, 3),
         marker(series.style)
     )
 }
@@ -205,7 +202,8 @@ pub(crate) fn log_log(
         x: Axis::logarithmic(all().map(|point| point.x)),
         // Fit the ordinates to bands of at most a factor of 3, so that curves are not squashed.
         y: Axis::logarithmic(all().flat_map(|point| {
-            [point.y, point.low.max(point.y / 3.0), point.high.min(point.y * 3.0)]
+            let Interval { middle, low, high } = point.y;
+            [middle, low.max(middle / 3.0), high.min(middle * 3.0)]
         })),
     };
     let mut svg = frame.start(title, x_title, y_title);
@@ -229,10 +227,10 @@ pub(crate) fn log_log(
     );
     for line in series {
         let place = |x: f64, y: f64| format!("{:.1},{:.1}", frame.x(x), frame.y(y));
-        let upper = line.points.iter().map(|point| place(point.x, point.high));
-        let lower = line.points.iter().rev().map(|point| place(point.x, point.low));
+        let upper = line.points.iter().map(|point| place(point.x, point.y.high));
+        let lower = line.points.iter().rev().map(|point| place(point.x, point.y.low));
         let band: Vec<String> = upper.chain(lower).collect();
-        let middle: Vec<String> = line.points.iter().map(|p| place(p.x, p.y)).collect();
+        let middle: Vec<String> = line.points.iter().map(|p| place(p.x, p.y.middle)).collect();
         let _ = write!(
             svg,
             "<g class=\"s{}\"><polygon class=\"band\" points=\"{}\"/><polyline class=\"line\" \
@@ -247,29 +245,20 @@ pub(crate) fn log_log(
     svg + "</svg>"
 }
 
-/// A published range, drawn as a band over the whole width.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Range {
-    /// Text of the band.
-    pub label: String,
-    /// Lower ordinate.
-    pub low: f64,
-    /// Upper ordinate.
-    pub high: f64,
-}
-
-/// Draws points with error bars over 0…100% on linear axes; ordinates in percent.
+/// Draws points with error bars over 0…100% on linear axes; ordinates in percent. Ranges of ordinates are
+/// bands over the whole width, each with its text.
 pub(crate) fn scatter(
     title: &str,
     x_title: &str,
     y_title: &str,
     series: &[Series],
-    ranges: &[Range],
+    ranges: &[(&str, [f64; 2])],
 ) -> String {
     let ordinates = series
         .iter()
-        .flat_map(|series| series.points.iter().flat_map(|point| [point.low, point.y, point.high]))
-        .chain(ranges.iter().flat_map(|range| [range.low, range.high]));
+        .flat_map(|series| &series.points)
+        .flat_map(|Point { y, .. }| [y.low, y.middle, y.high])
+        .chain(ranges.iter().flat_map(|(_, range)| *range));
     let (low, high) =
         ordinates.fold((0.0_f64, 5.0_f64), |(low, high), value| (low.min(value), high.max(value)));
     let room = 0.06 * (high - low);
@@ -278,8 +267,8 @@ pub(crate) fn scatter(
         y: Axis::linear(if low < 0.0 { low - room } else { 0.0 }, high + room),
     };
     let mut svg = frame.start(title, x_title, y_title);
-    for range in ranges {
-        let (top, bottom) = (frame.y(range.high), frame.y(range.low));
+    for (label, range) in ranges {
+        let [bottom, top] = range.map(|ordinate| frame.y(ordinate));
         let _ = write!(
             svg,
             "<rect class=\"range\" x=\"{LEFT}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>\
@@ -289,7 +278,7 @@ pub(crate) fn scatter(
             bottom - top + 2.0,
             LEFT + 6.0,
             if top - 5.0 > TOP + 8.0 { top - 5.0 } else { bottom + 14.0 },
-            escape(&range.label)
+            escape(label)
         );
     }
     for dots in series {
@@ -299,8 +288,8 @@ pub(crate) fn scatter(
             let _ = write!(
                 svg,
                 "<line class=\"bar\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/>{}",
-                frame.y(point.low),
-                frame.y(point.high),
+                frame.y(point.y.low),
+                frame.y(point.y.high),
                 mark(&frame, dots, point)
             );
         }
@@ -323,15 +312,16 @@ fn labels(frame: &Frame, series: &[Series]) -> String {
             svg,
             "<text class=\"small\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
             frame.x(point.x) + 9.0,
-            frame.y(point.y) + 4.0,
+            frame.y(point.y.middle) + 4.0,
             escape(&point.label)
         );
     }
-    crowded.sort_by(|a, b| frame.y(a.y).total_cmp(&frame.y(b.y)));
+    let height_of = |point: &&Point| frame.y(point.y.middle);
+    crowded.sort_by(|a, b| height_of(a).total_cmp(&height_of(b)));
     let column = crowded.iter().map(|point| frame.x(point.x)).fold(WIDTH, f64::min) - 26.0;
     // Centre the block on the points, but inside the frame.
     let count = crowded.len() as f64;
-    let centre = crowded.iter().map(|point| frame.y(point.y)).sum::<f64>() / count.max(1.0);
+    let centre = crowded.iter().map(height_of).sum::<f64>() / count.max(1.0);
     let height = SPACING * (count - 1.0).max(0.0);
     let lowest = (HEIGHT - BOTTOM - 6.0 - height).max(TOP + 6.0);
     let start = (centre - 0.5 * height).clamp(TOP + 6.0, lowest);
@@ -343,7 +333,7 @@ fn labels(frame: &Frame, series: &[Series]) -> String {
              class=\"small\" x=\"{column:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
             column + 3.0,
             frame.x(point.x),
-            frame.y(point.y),
+            height_of(point),
             y + 4.0,
             escape(&point.label)
         );
@@ -356,7 +346,8 @@ mod tests {
     use super::*;
 
     fn point(x: f64, y: f64) -> Point {
-        Point { x, y, low: 0.8 * y, high: 1.2 * y, label: "room".into() }
+        let y = Interval { middle: y, low: 0.8 * y, high: 1.2 * y };
+        Point { x, y, label: "room".into() }
     }
 
     fn attribute(svg: &str, name: &str) -> Vec<f64> {
@@ -407,8 +398,7 @@ mod tests {
     #[test]
     fn overheads_have_bars_and_published_ranges() {
         let series = [Series { style: 1, name: "v".into(), points: vec![point(80.0, 40.0)] }];
-        let range = Range { label: "thesis <closed>".into(), low: 40.0, high: 50.0 };
-        let svg = scatter("t", "x", "y", &series, &[range]);
+        let svg = scatter("t", "x", "y", &series, &[("thesis <closed>", [40.0, 50.0])]);
         assert!(svg.contains("class=\"range\"") && svg.contains("class=\"bar\""));
         assert!(svg.contains("thesis &lt;closed&gt;"));
     }
