@@ -244,6 +244,14 @@ fn rmse_cell(summary: &Summary) -> String {
     judged_cell(summary.rmse, summary.mse_judged)
 }
 
+/// Head of a column, and the function that formats its cell in a row.
+type Column<'a, R> = (&'a str, &'a dyn Fn(&R) -> String);
+
+/// Percentage of a share, or nothing.
+fn share_cell(share: Option<f64>) -> String {
+    share.map_or_else(String::new, percent)
+}
+
 /// Three digits of a figure, or nothing.
 fn optional_cell(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| number(value, 3))
@@ -255,112 +263,84 @@ pub fn figures(report: &Report, scene: &str) -> String {
         report.summaries.iter().filter(|summary| summary.scene == scene).collect();
     let names: BTreeSet<&String> =
         own.iter().flat_map(|summary| summary.statistics.keys()).collect();
-    let mut table = Table::new(
-        format!(
-            "Means over the seeds. Mean ratio: the picture's mean over the reference's, with its \
-             95% interval; a mean further off than {SUSPICIOUS_DEVIATION} standard errors is marked."
-        ),
-        &[
-            "sampler",
-            "at",
-            "runs",
-            "samples",
-            "seconds",
-            "RMSE",
-            "MSE",
-            "relMSE",
-            "relMSE,<br>trimmed",
-            "relMSE,<br>99.9%",
-            "relMSE,<br>largest",
-            "relMSE,<br>surfaces",
-            "trimmed,<br>surfaces",
-            "MSE,<br>environment",
-            "ꟻLIP",
-            "mean ratio",
-            "visible<br>rays",
-            "GPU ms<br>per sample",
-        ],
+    let relative = |s: &Summary, value: f64| judged_cell(value, s.relmse_judged);
+    let on_surfaces = |s: &Summary, value: fn(PartErrors) -> f64| {
+        let Parts { surfaces, surfaces_judged, .. } = s.parts;
+        surfaces.map_or("–".to_owned(), |part| judged_cell(value(part), surfaces_judged))
+    };
+    let on_environment = |part: PartErrors| number(part.mse, 3);
+    let columns: [Column<'_, Summary>; 18] = [
+        ("sampler", &|s| escape(&s.sampler)),
+        ("at", &|s| s.rule.describe()),
+        ("runs", &|s| s.runs.to_string()),
+        ("samples", &|s| count(s.spp)),
+        ("seconds", &|s| number(s.seconds, 3)),
+        ("RMSE", &rmse_cell),
+        ("MSE", &|s| judged_cell(s.mse, s.mse_judged)),
+        ("relMSE", &|s| relative(s, s.relmse)),
+        ("relMSE,<br>trimmed", &|s| relative(s, s.relmse_trimmed)),
+        ("relMSE,<br>99.9%", &|s| relative(s, s.relmse_p999)),
+        ("relMSE,<br>largest", &|s| relative(s, s.relmse_max)),
+        ("relMSE,<br>surfaces", &|s| on_surfaces(s, |part| part.relmse)),
+        ("trimmed,<br>surfaces", &|s| on_surfaces(s, |part| part.relmse_trimmed)),
+        ("MSE,<br>environment", &|s| s.parts.environment.map_or("–".to_owned(), on_environment)),
+        ("ꟻLIP", &|s| optional_cell(s.flip)),
+        ("mean ratio", &mean_cell),
+        ("visible<br>rays", &|s| share_cell(s.visible_share)),
+        ("GPU ms<br>per sample", &|s| number(s.total_ms(), 3)),
+    ];
+    let caption = format!(
+        "Means over the seeds. Mean ratio: the picture's mean over the reference's, with its \
+         95% interval; a mean further off than {SUSPICIOUS_DEVIATION} standard errors is marked."
     );
+    let mut table = Table::new(caption, &columns.map(|(head, _)| head));
     table.columns(&names.iter().map(|name| name.replace('_', " ")).collect::<Vec<_>>());
     for rule in &report.rules {
-        let of_rule: Vec<&&Summary> = own.iter().filter(|summary| summary.rule == *rule).collect();
-        for (index, summary) in of_rule.into_iter().enumerate() {
-            let relative = |value: f64| judged_cell(value, summary.relmse_judged);
-            let Parts { surfaces, environment, surfaces_judged } = summary.parts;
-            let on_surfaces = |value: fn(PartErrors) -> f64| {
-                surfaces.map_or("–".to_owned(), |part| judged_cell(value(part), surfaces_judged))
-            };
-            let mut mean = interval(&summary.mean_ratio, 4);
-            if summary.is_suspicious() {
-                let deviation = number(summary.mean_deviation.unwrap_or(0.0), 2);
-                mean += &format!(" <strong class=\"warn\">{deviation} σ</strong>");
-            }
-            let mut cells = vec![
-                escape(&summary.sampler),
-                rule.describe(),
-                summary.runs.to_string(),
-                count(summary.spp),
-                number(summary.seconds, 3),
-                rmse_cell(summary),
-                judged_cell(summary.mse, summary.mse_judged),
-                relative(summary.relmse),
-                relative(summary.relmse_trimmed),
-                relative(summary.relmse_p999),
-                relative(summary.relmse_max),
-                on_surfaces(|part| part.relmse),
-                on_surfaces(|part| part.relmse_trimmed),
-                environment.map_or("–".to_owned(), |part| number(part.mse, 3)),
-                optional_cell(summary.flip),
-                mean,
-                summary.visible_share.map_or_else(String::new, percent),
-                number(summary.total_ms(), 3),
-            ];
-            let statistics = &summary.statistics;
-            cells.extend(names.iter().map(|name| optional_cell(statistics.get(*name).copied())));
-            table.row(index == 0, cells);
+        let of_rule = own.iter().filter(|summary| summary.rule == *rule);
+        for (index, summary) in of_rule.enumerate() {
+            let statistic = |name: &&String| optional_cell(summary.statistics.get(*name).copied());
+            let cells = columns.iter().map(|(_, cell)| cell(summary));
+            table.row(index == 0, cells.chain(names.iter().map(statistic)).collect());
         }
     }
     table.html()
+}
+
+/// Formats the mean ratio, and marks a suspicious one.
+fn mean_cell(summary: &Summary) -> String {
+    let mut mean = interval(&summary.mean_ratio, 4);
+    if summary.is_suspicious() {
+        let deviation = number(summary.mean_deviation.unwrap_or(0.0), 2);
+        mean += &format!(" <strong class=\"warn\">{deviation} σ</strong>");
+    }
+    mean
 }
 
 /// Overhead of every sampler in every scene, then pass by pass.
 pub fn overheads(overheads: &[Overhead]) -> String {
     let Some(first) = overheads.first() else { return String::new() };
     let baseline = escape(&first.baseline);
-    let mut table = Table::new(
-        format!(
-            "Time per sample over that of {baseline}, by the device's timestamps and by the wall \
-             clock: median over {} interleaved rounds with the interval that holds it with 95% \
-             confidence.",
-            first.rounds
-        ),
-        &[
-            "scene",
-            "sampler",
-            "blocked rays<br>of the baseline",
-            "blocked rays<br>of the sampler",
-            "device time",
-            "wall time",
-            "ms per sample,<br>baseline",
-            "ms per sample,<br>sampler",
-        ],
+    let columns: [Column<'_, Overhead>; 8] = [
+        ("scene", &|o| escape(&o.scene)),
+        ("sampler", &|o| escape(&o.sampler)),
+        ("blocked rays<br>of the baseline", &|o| share_cell(o.blocked_share)),
+        ("blocked rays<br>of the sampler", &|o| share_cell(o.own_blocked_share)),
+        ("device time", &|o| percent_more(&o.total)),
+        ("wall time", &|o| percent_more(&o.wall)),
+        ("ms per sample,<br>baseline", &|o| number(o.total_ms[0], 3)),
+        ("ms per sample,<br>sampler", &|o| number(o.total_ms[1], 3)),
+    ];
+    let caption = format!(
+        "Time per sample over that of {baseline}, by the device's timestamps and by the wall \
+         clock: median over {} interleaved rounds with the interval that holds it with 95% \
+         confidence.",
+        first.rounds
     );
-    let share = |share: Option<f64>| share.map_or_else(String::new, percent);
+    let mut table = Table::new(caption, &columns.map(|(head, _)| head));
     let mut scene = "";
     for overhead in overheads {
-        table.row(
-            scene != overhead.scene,
-            vec![
-                escape(&overhead.scene),
-                escape(&overhead.sampler),
-                share(overhead.blocked_share),
-                share(overhead.own_blocked_share),
-                percent_more(&overhead.total),
-                percent_more(&overhead.wall),
-                number(overhead.total_ms[0], 3),
-                number(overhead.total_ms[1], 3),
-            ],
-        );
+        let cells = columns.iter().map(|(_, cell)| cell(overhead)).collect();
+        table.row(scene != overhead.scene, cells);
         scene = &overhead.scene;
     }
     let mut html = table.html();

@@ -87,15 +87,11 @@ pub(crate) fn picture_group(
             picture.halves
         );
     }
-    let _ = write!(
-        html,
-        "{}",
-        include_str!("viewer.html")
-            .replace("{{exposure}}", &format!("{:.2}", scene_pictures.exposure))
-            .replace("{{scene}}", &escape(&scene.name))
-            .replace("{{left}}", &options(pictures.len() - 1))
-            .replace("{{right}}", &options(0))
-    );
+    html += &include_str!("viewer.html")
+        .replace("{{exposure}}", &format!("{:.2}", scene_pictures.exposure))
+        .replace("{{scene}}", &escape(&scene.name))
+        .replace("{{left}}", &options(pictures.len() - 1))
+        .replace("{{right}}", &options(0));
     let pane = |number: usize, is_error: bool, caption: &str| {
         let link = if is_error { String::new() } else { links(&pictures[number], caption) };
         format!(
