@@ -263,7 +263,6 @@ impl Plan {
         let rays = options.shadow_rays.map(|rays| range("--shadow-rays", rays, 1, 4096));
         let shadow_rays = rays.transpose()?;
         let depth = range("--depth", options.depth.unwrap_or(DEFAULT_DEPTH), 1, 64)?;
-        let compares = !spp.is_empty() || options.time.is_some();
         let largest = spp.last().copied().unwrap_or(0);
         let reference_spp = options.reference_spp.unwrap_or_else(|| {
             largest.saturating_mul(REFERENCE_FACTOR).clamp(LEAST_REFERENCE_SPP, 1 << 26)
@@ -327,12 +326,7 @@ impl Plan {
         } else {
             None
         };
-        if !compares && overhead.is_none() {
-            return Err(Error::usage(
-                "nothing to do: give --spp, --time or --overhead, here or in the study file",
-            ));
-        }
-        Ok(Self {
+        let plan = Self {
             description,
             scenes,
             size: options.size,
@@ -345,7 +339,13 @@ impl Plan {
             reference,
             reference_check,
             overhead,
-        })
+        };
+        if !plan.compares() && plan.overhead.is_none() {
+            return Err(Error::usage(
+                "nothing to do: give --spp, --time or --overhead, here or in the study file",
+            ));
+        }
+        Ok(plan)
     }
 
     /// Rules that samplers are compared by: the numbers of samples, ascending, then the time.
