@@ -413,14 +413,6 @@ mod tests {
     }
 
     #[test]
-    fn later_layers_win() {
-        let file = Options { seeds: Some(5), depth: Some(2), ..Options::default() };
-        let line = Options { seeds: Some(1), ..Options::default() };
-        let both = line.over(file);
-        assert_eq!((both.seeds, both.depth), (Some(1), Some(2)));
-    }
-
-    #[test]
     fn defaults_make_a_whole_plan() {
         let plan = plan(Options::default()).unwrap();
         assert_eq!(
@@ -454,17 +446,6 @@ mod tests {
         let expected = "--reference-spp 96: no sampler as good as mis will be judged at 64 samples; \
                         expected 256 or more";
         assert_eq!(missing(Some(96), 64).as_deref(), Some(expected));
-    }
-
-    #[test]
-    fn overhead_alone_needs_no_reference() {
-        let samplers = Some(vec![Contender::plain(Sampler::Mis), Contender::plain(Sampler::Ris)]);
-        let options = Options { overhead: Some(true), samplers, ..Options::default() };
-        let plan = plan(options).unwrap();
-        assert!(!plan.compares());
-        let overhead = plan.overhead.unwrap();
-        assert_eq!(overhead.baseline.label, "mis");
-        assert_eq!(overhead.contenders.len(), 1);
     }
 
     #[test]

@@ -32,14 +32,3 @@ impl Rule {
         self.describe().replace(' ', "")
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rules_name_files() {
-        assert_eq!(Rule::Spp(400).file_stem(), "400spp");
-        assert_eq!(Rule::time(Duration::from_millis(500)).describe(), "0.5 s");
-    }
-}
