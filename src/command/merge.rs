@@ -54,24 +54,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         merged.write(&arguments.output)?;
         return summarize(arguments, &merged.metadata);
     }
-    let mut windows = Vec::new();
-    for group in groups {
-        let path = group[0].0;
-        let (image, metadata) = merge_window(group)?;
-        windows.push((path, image, metadata));
-    }
-    let metadata = if let [(_, image, metadata)] = &windows[..] {
-        image.write_exr(&arguments.output)?;
-        metadata.clone()
-    } else {
-        let parts = borrowed(&windows);
-        let (image, metadata) = join_windows(&parts)?;
-        warn_of_dropped_channels(&parts, &image);
-        image.write_exr(&arguments.output)?;
-        metadata
-    };
+    let windows = groups.into_iter().map(merge_window).collect::<Result<_>>()?;
+    let (_, image, metadata) = join(windows, join_windows)?;
+    image.write_exr(&arguments.output)?;
     summarize(arguments, &metadata)
 }
+
+/// A file with its image and metadata.
+type Picture<'a> = (&'a Path, Image, Metadata);
 
 /// Adds the sums of the checkpoints of one window.
 fn merge_to_checkpoint(groups: &[Vec<(&Path, Image)>], output: &Path) -> Result<Checkpoint> {
@@ -94,52 +84,37 @@ fn merge_to_checkpoint(groups: &[Vec<(&Path, Image)>], output: &Path) -> Result<
 }
 
 fn merge_exactly(group: &[(&Path, Image)]) -> Result<Checkpoint> {
-    let mut checkpoints = Vec::new();
-    for (path, image) in group {
-        checkpoints.push((*path, Checkpoint::from_image(image, path)?));
-    }
+    let read = |(path, image): &(&Path, Image)| Checkpoint::from_image(image, path);
+    let checkpoints = group.iter().map(read).collect::<Result<Vec<_>>>()?;
     let parts: Vec<(&Path, &Checkpoint)> =
-        checkpoints.iter().map(|(path, checkpoint)| (*path, checkpoint)).collect();
+        group.iter().map(|(path, _)| *path).zip(&checkpoints).collect();
     merge_checkpoints(&parts)
 }
 
 /// Merges the parts that show one window into an image: exactly where all are checkpoints.
-fn merge_window(group: Vec<(&Path, Image)>) -> Result<(Image, Metadata)> {
+fn merge_window(group: Vec<(&Path, Image)>) -> Result<Picture<'_>> {
     if group.iter().all(|(_, image)| Checkpoint::is_checkpoint(image)) {
         let merged = merge_exactly(&group)?;
         let mut image = merged.sums.to_image(Aov::value_variants());
         merged.metadata.store(&mut image);
-        return Ok((image, merged.metadata));
+        return Ok((group[0].0, image, merged.metadata));
     }
-    let mut parts = Vec::new();
-    for (path, image) in group {
-        parts.push(load_part(path, image)?);
-    }
-    if let [(_, image, metadata)] = &parts[..] {
-        return Ok((image.clone(), metadata.clone()));
-    }
-    let parts = borrowed(&parts);
-    let (image, metadata) = merge_images(&parts)?;
-    warn_of_dropped_channels(&parts, &image);
-    Ok((image, metadata))
+    let parts = group.into_iter().map(|(path, image)| load_part(path, image));
+    join(parts.collect::<Result<_>>()?, merge_images)
 }
 
-fn borrowed<'a>(parts: &'a [(&'a Path, Image, Metadata)]) -> Vec<Part<'a>> {
-    parts.iter().map(|(path, image, metadata)| Part { path, image, metadata }).collect()
-}
-
-/// Takes an image as it is, and a checkpoint as the image it gives.
-fn load_part(path: &Path, image: Image) -> Result<(&Path, Image, Metadata)> {
-    if Checkpoint::is_checkpoint(&image) {
-        let checkpoint = Checkpoint::from_image(&image, path)?;
-        return Ok((path, checkpoint.sums.to_image(Aov::value_variants()), checkpoint.metadata));
+/// Joins pictures under the name of the first, which alone stays as it is; warns of channels that get lost.
+fn join<'a>(
+    mut pictures: Vec<Picture<'a>>,
+    joined: fn(&[Part<'_>]) -> Result<(Image, Metadata)>,
+) -> Result<Picture<'a>> {
+    if pictures.len() == 1 {
+        return Ok(pictures.remove(0));
     }
-    let metadata = Metadata::load(&image, path)?;
-    Ok((path, image, metadata))
-}
-
-fn warn_of_dropped_channels(parts: &[Part<'_>], merged: &Image) {
-    for part in parts {
+    let parts: Vec<Part<'_>> =
+        pictures.iter().map(|(path, image, metadata)| Part { path, image, metadata }).collect();
+    let (merged, metadata) = joined(&parts)?;
+    for part in &parts {
         let is_dropped = |name: &&String| !merged.channels.contains_key(name.as_str());
         let dropped: Vec<&str> =
             part.image.channels.keys().filter(is_dropped).map(String::as_str).collect();
@@ -151,6 +126,17 @@ fn warn_of_dropped_channels(parts: &[Part<'_>], merged: &Image) {
             );
         }
     }
+    Ok((pictures[0].0, merged, metadata))
+}
+
+/// Takes an image as it is, and a checkpoint as the image it gives.
+fn load_part(path: &Path, image: Image) -> Result<Picture<'_>> {
+    if Checkpoint::is_checkpoint(&image) {
+        let checkpoint = Checkpoint::from_image(&image, path)?;
+        return Ok((path, checkpoint.sums.to_image(Aov::value_variants()), checkpoint.metadata));
+    }
+    let metadata = Metadata::load(&image, path)?;
+    Ok((path, image, metadata))
 }
 
 fn summarize(arguments: &Arguments, metadata: &Metadata) -> Result<()> {
