@@ -126,43 +126,38 @@ fn record(capabilities: &Capabilities) -> Option<PathBuf> {
 
 /// Runs the program's test of a device.
 fn test(index: usize, longest: Duration) -> Verdict {
-    let mut command = match own_program() {
-        Ok(command) => command,
-        Err(error) => return Verdict::NotRun(error.to_string()),
-    };
-    command.args([NAME, "--device", &index.to_string()]);
-    verdict(&mut command, longest)
+    let tested = own_program().and_then(|mut command| {
+        verdict(command.args([NAME, "--device", &index.to_string()]), longest)
+    });
+    tested.unwrap_or_else(|error| Verdict::NotRun(error.to_string()))
 }
 
-/// Runs a test and judges how it ended.
-fn verdict(command: &mut Command, longest: Duration) -> Verdict {
+/// Runs a test and judges how it ended. Fails where it cannot be run or watched.
+fn verdict(command: &mut Command, longest: Duration) -> std::io::Result<Verdict> {
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
     let start = Instant::now();
-    let mut child = match command.spawn() {
-        Ok(child) => child,
-        Err(error) => return Verdict::NotRun(error.to_string()),
-    };
+    let mut child = command.spawn()?;
     let status = loop {
-        match child.try_wait() {
-            Ok(Some(status)) => break status,
-            Ok(None) if start.elapsed() < longest => thread::sleep(INTERVAL),
-            Ok(None) => {
+        match child.try_wait()? {
+            Some(status) => break status,
+            None if start.elapsed() < longest => thread::sleep(INTERVAL),
+            None => {
                 let _ = child.kill().and_then(|()| child.wait().map(drop));
-                return Verdict::Failed(format!("no answer in {} s", longest.as_secs_f64()));
+                let seconds = longest.as_secs_f64();
+                return Ok(Verdict::Failed(format!("no answer in {seconds} s")));
             }
-            Err(error) => return Verdict::NotRun(error.to_string()),
         }
     };
     let mut output = String::new();
     let read = child.stdout.take().map(|mut pipe| pipe.read_to_string(&mut output));
-    match (crash(status), read, output.trim()) {
+    Ok(match (crash(status), read, output.trim()) {
         (Some(signal), ..) => Verdict::Failed(format!("the driver crashes ({signal})")),
         (None, Some(Ok(_)), PASSED) if status.success() => Verdict::Passed,
         (None, Some(Ok(_)), fault) if status.success() && !fault.is_empty() => {
             Verdict::Failed(fault.to_owned())
         }
         _ => Verdict::NotRun(status.to_string()),
-    }
+    })
 }
 
 /// Names the signal by which a process has crashed, and not been ended by someone.
@@ -190,10 +185,12 @@ fn crash(_status: ExitStatus) -> Option<&'static str> {
 
 #[cfg(all(test, unix))]
 mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
     use super::*;
 
     fn of(script: &str, longest: Duration) -> Verdict {
-        verdict(Command::new("sh").args(["-c", script]), longest)
+        verdict(Command::new("sh").args(["-c", script]), longest).unwrap()
     }
 
     #[test]
