@@ -82,36 +82,27 @@ fn colour_distance(a: Colour, b: Colour) -> f64 {
     distance.powf(COLOUR_EXPONENT)
 }
 
-/// A plane of values, row by row.
-struct Plane {
-    width: usize,
-    height: usize,
-    values: Vec<f64>,
-}
-
-impl Plane {
-    /// Convolves with `across(x)·down(y)`; the kernels have odd lengths, and pixels at the edge
-    /// continue beyond it.
-    fn filtered(&self, across: &[f64], down: &[f64]) -> Vec<f64> {
-        let (width, height) = (self.width, self.height);
-        let near = |centre: usize, tap: usize, kernel: &[f64], end: usize| {
-            (centre + tap).saturating_sub(kernel.len() / 2).min(end - 1)
-        };
-        let mut rows = vec![0.0; self.values.len()];
-        for (index, value) in rows.iter_mut().enumerate() {
-            let row = &self.values[index / width * width..][..width];
-            let taps = across.iter().enumerate();
-            *value = taps.map(|(tap, k)| k * row[near(index % width, tap, across, width)]).sum();
-        }
-        let at = |index: usize| -> f64 {
-            let taps = down.iter().enumerate();
-            taps.map(|(tap, k)| {
-                k * rows[near(index / width, tap, down, height) * width + index % width]
-            })
-            .sum()
-        };
-        (0..rows.len()).map(at).collect()
+/// Convolves values, row by row, with `across(x)·down(y)`; the kernels have odd lengths, and pixels at the
+/// edge continue beyond it.
+fn filtered(values: &[f64], width: usize, across: &[f64], down: &[f64]) -> Vec<f64> {
+    let height = values.len() / width;
+    let near = |centre: usize, tap: usize, kernel: &[f64], end: usize| {
+        (centre + tap).saturating_sub(kernel.len() / 2).min(end - 1)
+    };
+    let mut rows = vec![0.0; values.len()];
+    for (index, value) in rows.iter_mut().enumerate() {
+        let row = &values[index / width * width..][..width];
+        let taps = across.iter().enumerate();
+        *value = taps.map(|(tap, k)| k * row[near(index % width, tap, across, width)]).sum();
     }
+    let at = |index: usize| -> f64 {
+        let taps = down.iter().enumerate();
+        taps.map(|(tap, k)| {
+            k * rows[near(index / width, tap, down, height) * width + index % width]
+        })
+        .sum()
+    };
+    (0..rows.len()).map(at).collect()
 }
 
 /// Kernel of `weight(x)` for x = −radius…radius.
@@ -139,13 +130,11 @@ struct Seen {
 
 impl Seen {
     fn of(pixels: &[[u8; 3]], width: usize) -> Self {
-        let height = pixels.len() / width;
         let space: Vec<Colour> =
             pixels.iter().map(|pixel| opponent(transform(&XYZ, pixel.map(linear)))).collect();
-        let plane = |values: Vec<f64>| Plane { width, height, values };
         let [lightness, red, blue] = [0, 1, 2].map(|channel| {
-            let channel_plane = plane(space.iter().map(|colour| colour[channel]).collect());
-            sensed(&channel_plane, &SENSITIVITY[channel])
+            let values: Vec<f64> = space.iter().map(|colour| colour[channel]).collect();
+            sensed(&values, width, &SENSITIVITY[channel])
         });
         let colours = (0..pixels.len())
             .map(|index| {
@@ -153,14 +142,14 @@ impl Seen {
                 hunt_lab(transform(&RGB, xyz).map(|value| value.clamp(0.0, 1.0)))
             })
             .collect();
-        let grey = plane(space.iter().map(|colour| (colour[0] + 16.0) / 116.0).collect());
+        let grey: Vec<f64> = space.iter().map(|colour| (colour[0] + 16.0) / 116.0).collect();
         let sigma = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
         let radius = (3.0 * sigma).ceil() as i32;
         let bell = |x: f64| (-x * x / (2.0 * sigma * sigma)).exp();
         let smooth = balanced(kernel(radius, bell));
         let strength = |detector: Vec<f64>| -> Vec<f64> {
-            let across = grey.filtered(&detector, &smooth);
-            let down = grey.filtered(&smooth, &detector);
+            let across = filtered(&grey, width, &detector, &smooth);
+            let down = filtered(&grey, width, &smooth, &detector);
             across.into_iter().zip(down).map(|(x, y)| x.hypot(y)).collect()
         };
         let edges = strength(balanced(kernel(radius, |x| -x * bell(x))));
@@ -171,7 +160,7 @@ impl Seen {
 }
 
 /// Filters a channel by a sum of Gaussians `a·√(π/b)·exp(−π²·r²/b)`, r in degrees, that sums to 1.
-fn sensed(plane: &Plane, gaussians: &[(f64, f64); 2]) -> Vec<f64> {
+fn sensed(values: &[f64], width: usize, gaussians: &[(f64, f64); 2]) -> Vec<f64> {
     use std::f64::consts::PI;
     let radius = (3.0 * (WIDEST / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32;
     let parts: Vec<(f64, Vec<f64>)> = gaussians
@@ -184,9 +173,9 @@ fn sensed(plane: &Plane, gaussians: &[(f64, f64); 2]) -> Vec<f64> {
         })
         .collect();
     let total: f64 = parts.iter().map(|(weight, _)| weight).sum();
-    let mut result = vec![0.0; plane.values.len()];
+    let mut result = vec![0.0; values.len()];
     for (weight, bell) in &parts {
-        for (sum, value) in result.iter_mut().zip(plane.filtered(bell, bell)) {
+        for (sum, value) in result.iter_mut().zip(filtered(values, width, bell, bell)) {
             *sum += weight / total * value;
         }
     }
