@@ -224,7 +224,7 @@ fn plan(arguments: &Arguments) -> Result<Plan> {
             .map_err(|error| Error::usage(format!("--reference-check {text}: {error}")))
     };
     let samplers = arguments.samplers.as_ref().map(|texts| {
-        Contender::parse_all(texts.iter().map(String::as_str), defaults)
+        Contender::parse_all(texts, defaults)
             .map_err(|error| Error::usage(format!("--samplers: {error}")))
     });
     let options = Options {

@@ -51,13 +51,10 @@ impl Contender {
     ///
     /// # Errors
     /// As [`Contender::parse`], and for labels that occur twice or would share file names.
-    pub(crate) fn parse_all<'a>(
-        texts: impl IntoIterator<Item = &'a str>,
-        defaults: Parameters,
-    ) -> Result<Vec<Self>> {
+    pub(crate) fn parse_all(texts: &[impl AsRef<str>], defaults: Parameters) -> Result<Vec<Self>> {
         let mut contenders: Vec<Self> = Vec::new();
         for text in texts {
-            let contender = Self::parse(text, defaults)?;
+            let contender = Self::parse(text.as_ref(), defaults)?;
             if contenders.iter().any(|other| other.file_stem() == contender.file_stem()) {
                 return Err(Error::usage(format!("sampler {:?} is listed twice", contender.label)));
             }

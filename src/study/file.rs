@@ -144,27 +144,24 @@ impl StudyFile {
 }
 
 /// Parses a value, if there is one; a failure carries the value's location.
-fn read<T, V>(
+fn read<T, V, E: ToString>(
     entry: Option<Spanned<V>>,
-    parse: impl FnOnce(&V) -> Result<T, String>,
+    parse: impl FnOnce(&V) -> Result<T, E>,
 ) -> Result<Option<T>, TextError> {
     entry
         .map(|entry| {
             let span = entry.span();
-            parse(entry.get_ref()).map_err(|message| TextError { span, message })
+            let parsed = parse(entry.get_ref());
+            parsed.map_err(|error| TextError { span, message: error.to_string() })
         })
         .transpose()
 }
 
 impl Entries {
     fn into_options(self, folder: &Path, defaults: Parameters) -> Result<Options, TextError> {
-        let contender =
-            |text: &String| Contender::parse(text, defaults).map_err(|error| error.to_string());
+        let contender = |text: &String| Contender::parse(text, defaults);
         Ok(Options {
-            samplers: read(self.samplers, |texts| {
-                Contender::parse_all(texts.iter().map(String::as_str), defaults)
-                    .map_err(|error| error.to_string())
-            })?,
+            samplers: read(self.samplers, |texts| Contender::parse_all(texts, defaults))?,
             spp: self.spp,
             time: read(self.time, |text| parse_duration(text))?,
             seeds: self.seeds,
@@ -174,7 +171,7 @@ impl Entries {
             reference_sampler: read(self.reference_sampler, contender)?,
             reference_spp: self.reference_spp,
             reference_check: read(self.reference_check, |text| {
-                CheckPlan::parse(text, folder, defaults).map_err(|error| error.to_string())
+                CheckPlan::parse(text, folder, defaults)
             })?,
             overhead: self.overhead,
             overhead_baseline: read(self.overhead_baseline, contender)?,

@@ -290,7 +290,7 @@ mod tests {
     }
 
     fn times(runs: &[Run], own: f64) -> Vec<TimeToQuality> {
-        let samplers = crate::study::contender::Contender::parse_all(["mis"], Default::default());
+        let samplers = crate::study::contender::Contender::parse_all(&["mis"], Default::default());
         let options = Options { samplers: samplers.ok(), ..Options::default() };
         let plan = Plan::new(vec!["room.toml".into()], Description::default(), options, Vec::new());
         let reference = OwnErrors { relmse: Some(own), ..OwnErrors::default() };

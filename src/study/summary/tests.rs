@@ -18,8 +18,8 @@ fn scene(own_mse: f64) -> StudiedScene {
 }
 
 fn plan() -> Plan {
-    let contenders = ["mis", "ris"].into_iter();
-    let samplers = crate::study::contender::Contender::parse_all(contenders, Default::default());
+    let samplers =
+        crate::study::contender::Contender::parse_all(&["mis", "ris"], Default::default());
     let options = Options { samplers: samplers.ok(), spp: Some(vec![2, 4]), ..Options::default() };
     Plan::new(vec!["room.toml".into()], Description::default(), options, Vec::new()).unwrap()
 }
