@@ -49,12 +49,11 @@ impl Study<'_> {
             self.watch.run(session, &rules, limit.is_some())?;
             let (mut measurement, picture) = Measurement::of(session, reference, surfaces)?;
             let spp = measurement.spp;
-            let is_level = match rule {
-                Rule::Spp(_) => self.plan.spp.contains(&spp),
-                Rule::Seconds(_) => session.met(&by_time).is_some(),
+            let (level, is_level) = match rule {
+                Rule::Spp(_) => (Rule::Spp(spp), self.plan.spp.contains(&spp)),
+                Rule::Seconds(_) => (rule, session.met(&by_time).is_some()),
             };
             if is_level {
-                let level = if limit.is_some() { rule } else { Rule::Spp(spp) };
                 let shown = [&picture, &mean].map(|picture| preview(picture, stops));
                 measurement.flip = Some(mean_flip(&shown[0], &shown[1], picture.width as usize));
                 let stem = run_stem(contender, level, seed);
@@ -68,11 +67,7 @@ impl Study<'_> {
                 measurement.image = Some(Folder::image_name(&scene.name, &stem));
             }
             measurements.push(measurement);
-            let done = match rule {
-                Rule::Spp(end) => spp >= end,
-                Rule::Seconds(_) => is_level,
-            };
-            if done {
+            if is_level && level == rule {
                 break;
             }
         }
