@@ -3,30 +3,29 @@
 //! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a
 //! reference in two halves ([`engine`], [`job`], [`rule`], [`mod@reference`], [`reference_check`],
 //! [`halves`], [`own_errors`], [`surfaces`], [`overhead`]), each kept as one of the [`runs`] in the report
-//! [`folder`] →
-//! figures over the seeds ([`summary`], [`quality`], [`statistics`]) → `results.json`, `results.csv`
-//! ([`results`]) and the page ([`report`]). [`metrics`] defines the errors.
+//! [`folder`] → figures over the seeds ([`summary`], [`quality`], [`statistics`]) → `results.json`,
+//! `results.csv` ([`results`]) and the page ([`report`]). [`metrics`] defines the errors.
 
 pub mod contender;
 pub(crate) mod engine;
 pub(crate) mod falsecolour;
 pub mod file;
 mod finished;
-pub mod folder;
+pub(crate) mod folder;
 mod halves;
 mod job;
 pub mod metrics;
-pub mod overhead;
-pub(crate) mod own_errors;
+mod overhead;
+mod own_errors;
 pub mod plan;
-pub mod quality;
-pub mod reference;
-pub mod reference_check;
-pub mod report;
-pub mod results;
-pub mod rule;
-pub mod runs;
+mod quality;
+mod reference;
+mod reference_check;
+pub(crate) mod report;
+pub(crate) mod results;
+mod rule;
+mod runs;
 pub mod statistics;
-pub mod summary;
-pub mod surfaces;
-pub(crate) mod watch;
+mod summary;
+mod surfaces;
+mod watch;

@@ -5,11 +5,11 @@
 //! light or dark (`page.css`).
 
 mod curves;
-pub mod html;
+mod html;
 mod overhead;
-pub mod pictures;
-pub(crate) mod plot;
-pub mod tables;
+mod pictures;
+mod plot;
+mod tables;
 mod verdict;
 mod viewer;
 
