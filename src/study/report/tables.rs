@@ -6,7 +6,8 @@ use std::collections::BTreeSet;
 use super::html::{Table, count, escape, interval, number, percent, percent_added, percent_more};
 use crate::study::{
     metrics::parts::PartErrors,
-    overhead::Overhead,
+    overhead::{Overhead, PassOverhead},
+    plan::PublishedErrors,
     quality::{Figure, THRESHOLDS, TimeToQuality},
     results::Report,
     rule::Rule,
@@ -193,43 +194,37 @@ pub fn published(report: &Report) -> String {
             .collect();
         let [first, second] = names[..] else { continue };
         let [a, b] = [first, second].map(|name| escape(name));
-        let mut table = Table::new(
-            format!(
-                "{} beside this study: {}. The published unit is unknown, so that only the ratios \
-                 can be compared.",
-                escape(source),
-                escape(scene)
-            ),
-            &[
-                "samples per pixel",
-                &format!("published,<br>{a}"),
-                &format!("published,<br>{b}"),
-                "published<br>ratio",
-                &format!("RMSE here,<br>{a}"),
-                &format!("RMSE here,<br>{b}"),
-                "ratio<br>here",
-            ],
+        let value = |entry: &PublishedErrors, name: &String| entry.values.get(name).copied();
+        let published = |entry: &PublishedErrors, name: &String| {
+            value(entry, name).map_or_else(String::new, |value| number(value, 6))
+        };
+        let ratio = |entry: &PublishedErrors| {
+            let ratio = value(entry, first).zip(value(entry, second));
+            ratio.map_or_else(String::new, |(a, b)| number(b / a, 3))
+        };
+        let ours = |entry: &PublishedErrors, name: &str, cell: fn(&Summary) -> String| {
+            let found = find(report, scene, name, Rule::Spp(entry.spp));
+            found.map_or_else(|| "–".to_owned(), cell)
+        };
+        let ratio_here = |summary: &Summary| ratio_cell(summary.rmse_ratio.as_ref(), false);
+        let columns: [Column<'_, PublishedErrors>; 7] = [
+            ("samples per pixel", &|e| e.spp.to_string()),
+            (&format!("published,<br>{a}"), &|e| published(e, first)),
+            (&format!("published,<br>{b}"), &|e| published(e, second)),
+            ("published<br>ratio", &ratio),
+            (&format!("RMSE here,<br>{a}"), &|e| ours(e, first, rmse_cell)),
+            (&format!("RMSE here,<br>{b}"), &|e| ours(e, second, rmse_cell)),
+            ("ratio<br>here", &|e| ours(e, second, ratio_here)),
+        ];
+        let caption = format!(
+            "{} beside this study: {}. The published unit is unknown, so that only the ratios \
+             can be compared.",
+            escape(source),
+            escape(scene)
         );
+        let mut table = Table::new(caption, &columns.map(|(head, _)| head));
         for entry in &entries {
-            let value = |name: &String| entry.values.get(name).copied();
-            let published = |name| value(name).map_or_else(String::new, |value| number(value, 6));
-            let ratio = value(first).zip(value(second)).map(|(a, b)| number(b / a, 3));
-            let rule = Rule::Spp(entry.spp);
-            let ours = |name: &str, cell: fn(&Summary) -> String| {
-                find(report, scene, name, rule).map_or_else(|| "–".to_owned(), cell)
-            };
-            table.row(
-                false,
-                vec![
-                    entry.spp.to_string(),
-                    published(first),
-                    published(second),
-                    ratio.unwrap_or_default(),
-                    ours(first, rmse_cell),
-                    ours(second, rmse_cell),
-                    ours(second, |summary| ratio_cell(summary.rmse_ratio.as_ref(), false)),
-                ],
-            );
+            table.row(false, columns.iter().map(|(_, cell)| cell(entry)).collect());
         }
         html += &table.html();
     }
@@ -343,24 +338,20 @@ pub fn overheads(overheads: &[Overhead]) -> String {
         table.row(scene != overhead.scene, cells);
         scene = &overhead.scene;
     }
+    let columns: [Column<'_, PassOverhead>; 5] = [
+        ("pass", &|p| escape(&p.pass)),
+        ("ms per sample,<br>baseline", &|p| number(p.ms[0], 3)),
+        ("ms per sample,<br>sampler", &|p| number(p.ms[1], 3)),
+        ("ratio", &|p| p.ratio.map_or("–".to_owned(), |ratio| interval(&ratio, 3))),
+        ("adds to the<br>whole time", &|p| percent_added(&p.added_share)),
+    ];
     let mut html = table.html();
     for overhead in overheads {
         let (scene, sampler) = (escape(&overhead.scene), escape(&overhead.sampler));
-        let mut table = Table::new(
-            format!("{sampler} against {baseline} in {scene}, pass by pass"),
-            &[
-                "pass",
-                "ms per sample,<br>baseline",
-                "ms per sample,<br>sampler",
-                "ratio",
-                "adds to the<br>whole time",
-            ],
-        );
+        let caption = format!("{sampler} against {baseline} in {scene}, pass by pass");
+        let mut table = Table::new(caption, &columns.map(|(head, _)| head));
         for pass in &overhead.passes {
-            let [ours, theirs] = pass.ms.map(|ms| number(ms, 3));
-            let ratio = pass.ratio.map_or("–".to_owned(), |ratio| interval(&ratio, 3));
-            let added = percent_added(&pass.added_share);
-            table.row(false, vec![escape(&pass.pass), ours, theirs, ratio, added]);
+            table.row(false, columns.iter().map(|(_, cell)| cell(pass)).collect());
         }
         html += &format!(
             "<details><summary>{sampler} in {scene}, pass by pass</summary>{}</details>",
