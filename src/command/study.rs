@@ -28,12 +28,6 @@ use crate::{
     terminal::say,
 };
 
-/// Settings of `--quick` without a study file.
-const QUICK_SPP: u32 = 16;
-const QUICK_TIME: Duration = Duration::from_secs(2);
-const QUICK_SIZE: [u32; 2] = [80, 60];
-const QUICK_REFERENCE_SPP: u32 = 512;
-
 /// Group of options in help: what the errors are measured against.
 const REFERENCE: &str = "Reference";
 /// Group: extra time per sample.
@@ -251,11 +245,11 @@ fn plan(arguments: &Arguments) -> Result<Plan> {
 fn quick_options(arguments: &Arguments) -> Options {
     let nothing_asked = arguments.time.is_none() && !arguments.overhead;
     Options {
-        spp: nothing_asked.then(|| vec![QUICK_SPP]),
-        time: nothing_asked.then_some(QUICK_TIME),
+        spp: nothing_asked.then(|| vec![16]),
+        time: nothing_asked.then_some(Duration::from_secs(2)),
         seeds: Some(2),
-        size: Some(QUICK_SIZE),
-        reference_spp: Some(QUICK_REFERENCE_SPP),
+        size: Some([80, 60]),
+        reference_spp: Some(512),
         overhead_spp: Some(4),
         overhead_repetitions: Some(6),
         ..Options::default()
