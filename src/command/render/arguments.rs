@@ -361,16 +361,14 @@ impl Arguments {
     /// # Errors
     /// [`Error::Usage`] for options that contradict each other or are out of range.
     pub(super) fn settings(&self, denoises: bool) -> Result<Settings> {
-        let special = self.output.as_ref().filter(|output| is_special_file(output));
-        if let (Some(output), None) = (&self.output, special)
-            && extension(output) != "exr"
-        {
-            return Err(Error::usage(format!(
-                "--output {}: expected a name that ends in .exr; --png writes a preview beside it",
-                output.display()
-            )));
-        }
-        if let Some(output) = special {
+        if let Some(output) = self.output.as_ref().filter(|output| !is_special_file(output)) {
+            if extension(output) != "exr" {
+                return Err(Error::usage(format!(
+                    "--output {}: expected a name that ends in .exr; --png writes a preview beside it",
+                    output.display()
+                )));
+            }
+        } else if let Some(output) = &self.output {
             let beside = [
                 ("--png", self.png),
                 ("--png-every", self.png_every.is_some()),
@@ -408,11 +406,8 @@ impl Arguments {
             let wanted = [Aov::Unfiltered, Aov::Albedo, Aov::Normal];
             aovs.extend(wanted.iter().filter(|aov| !self.aov.contains(aov)));
         }
-        if let Some(error) = self.error
-            && !(error.is_finite() && error > 0.0)
-        {
-            let message = format!("--error {error}: expected a finite number above 0");
-            return Err(Error::usage(message));
+        if let Some(error) = self.error.filter(|error| !(error.is_finite() && *error > 0.0)) {
+            return Err(Error::usage(format!("--error {error}: expected a finite number above 0")));
         }
         let spp = self.rules(Asked::default()).samples.unwrap_or(1);
         if self.sample_offset.checked_add(spp).is_none() {
