@@ -112,12 +112,7 @@ impl Canvas {
     /// # Errors
     /// [`crate::Error::Io`] with the cause.
     pub(crate) fn write_png(&self, path: &Path) -> Result<()> {
-        let dimension = |value: usize| {
-            u32::try_from(value).map_err(|_| {
-                crate::Error::format(path, format!("{value} pixels along one side of a PNG"))
-            })
-        };
-        png::write_rgb8(path, dimension(self.width)?, dimension(self.height)?, &self.pixels)
+        png::write_rgb8(path, self.width as u32, self.height as u32, &self.pixels)
     }
 }
 

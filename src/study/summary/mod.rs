@@ -145,10 +145,8 @@ fn means(
 
 /// Means over the seeds of the errors in both parts of the picture.
 fn mean_parts(own: &[(&Run, &Measurement)], scene: &StudiedScene) -> Parts {
-    let average = |part: fn(&Parts) -> Option<PartErrors>| {
-        mean_of_parts(own.iter().map(|(_, m)| part(&m.parts)))
-    };
-    let (surfaces, environment) = (average(|p| p.surfaces), average(|p| p.environment));
+    let surfaces = mean_of_parts(own.iter().map(|(_, m)| m.parts.surfaces));
+    let environment = mean_of_parts(own.iter().map(|(_, m)| m.parts.environment));
     let own = scene.parts.unwrap_or_default();
     let surfaces_judged = surfaces.is_some_and(|part| own.judges(&part));
     Parts { surfaces, environment, surfaces_judged }
