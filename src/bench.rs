@@ -175,16 +175,13 @@ impl<'a> Bench<'a> {
         Ok(Self { device, scene, waves, film_set, _counters: counters, wave })
     }
 
-    fn sets(&self) -> [&DescriptorSet; 3] {
-        [self.scene.set(), self.waves.set(), &self.film_set]
-    }
-
     /// Runs one pass; seconds of the device, and of the host where it traces.
     fn run(&self, pass: &Pass) -> Result<f64> {
         let tracer = self.scene.geometry().host_tracer();
         let host = tracer.map(|tracer| (tracer, &self.waves.answers, self.scene.parameters()));
         let mut recording = Recording::begin(self.device, 1, host, false)?;
-        recording.add(pass, &self.sets(), &self.wave)?;
+        let sets = [self.scene.set(), self.waves.set(), &self.film_set];
+        recording.add(pass, &sets, &self.wave)?;
         Ok(recording.finish()?.values().sum::<f64>() * 1e-3)
     }
 
