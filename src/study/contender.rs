@@ -33,14 +33,11 @@ impl Contender {
         let label = text.trim();
         let mut parts = label.split(':');
         let name = parts.next().unwrap_or_default();
-        let sampler =
-            Sampler::ALL.iter().copied().find(|sampler| sampler.name() == name).ok_or_else(
-                || {
-                    let known: Vec<_> = Sampler::ALL.iter().map(|sampler| sampler.name()).collect();
-                    let known = known.join(", ");
-                    Error::usage(format!("there is no sampler {name:?}; known: {known}"))
-                },
-            )?;
+        let Some(&sampler) = Sampler::ALL.iter().find(|sampler| sampler.name() == name) else {
+            let known: Vec<_> = Sampler::ALL.iter().map(|sampler| sampler.name()).collect();
+            let known = known.join(", ");
+            return Err(Error::usage(format!("there is no sampler {name:?}; known: {known}")));
+        };
         let mut parameters = defaults;
         parts.try_for_each(|assignment| parameters.set(assignment))?;
         sampler.check(&parameters, 1, &[])?;

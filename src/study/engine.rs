@@ -63,12 +63,8 @@ pub(crate) fn run(
     for scene in &scenes {
         study.expect(scene);
     }
-    for scene in &scenes {
-        if let Err(error) = study.run_scene(scene, &mut results) {
-            return Ok((results, Some(error)));
-        }
-    }
-    Ok((results, None))
+    let done = scenes.iter().try_for_each(|scene| study.run_scene(scene, &mut results));
+    Ok((results, done.err()))
 }
 
 /// A study at work.

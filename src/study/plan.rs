@@ -384,10 +384,8 @@ impl Plan {
         let mut tasks = Vec::new();
         for rule in samples.into_iter().chain(self.time.map(Rule::time)) {
             for seed in 1..=self.seeds {
-                for index in 0..contenders.len() {
-                    let turned = (index + seed as usize - 1) % contenders.len();
-                    tasks.push((rule, seed, &contenders[turned]));
-                }
+                let (last, first) = contenders.split_at((seed as usize - 1) % contenders.len());
+                tasks.extend(first.iter().chain(last).map(|contender| (rule, seed, contender)));
             }
         }
         tasks

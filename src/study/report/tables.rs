@@ -282,7 +282,7 @@ pub fn figures(report: &Report, scene: &str) -> String {
         ("ꟻLIP", &|s| optional_cell(s.flip)),
         ("mean ratio", &mean_cell),
         ("visible<br>rays", &|s| share_cell(s.visible_share)),
-        ("GPU ms<br>per sample", &|s| number(s.total_ms(), 3)),
+        ("GPU ms<br>per sample", &|s| number(s.gpu_ms_per_sample.values().sum(), 3)),
     ];
     let caption = format!(
         "Means over the seeds. Mean ratio: the picture's mean over the reference's, with its \

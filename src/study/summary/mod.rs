@@ -82,11 +82,6 @@ impl Summary {
     pub(crate) fn is_suspicious(&self) -> bool {
         self.mean_deviation.is_some_and(|deviation| deviation.abs() > SUSPICIOUS_DEVIATION)
     }
-
-    /// Device milliseconds per sample of all passes.
-    pub(crate) fn total_ms(&self) -> f64 {
-        self.gpu_ms_per_sample.values().sum()
-    }
 }
 
 /// Summarises runs in the plan's order of scenes, rules and samplers; leaves out samplers without a

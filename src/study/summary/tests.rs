@@ -89,7 +89,7 @@ fn ratios_are_of_pairs_of_one_seed() {
     assert!((ris.mean_ratio.middle - 1.015).abs() < 1e-12);
     assert_eq!(ris.mean_deviation, Some(-2.0));
     assert!((ris.visible_share.unwrap() - 0.15).abs() < 1e-12);
-    assert_eq!((ris.statistics["rebuilds"], ris.total_ms()), (1.5, 3.0));
+    assert_eq!((ris.statistics["rebuilds"], ris.gpu_ms_per_sample["sample"]), (1.5, 3.0));
 }
 
 #[test]
