@@ -10,9 +10,8 @@ use std::{
 use super::{
     contender::Contender,
     folder::Folder,
-    plan::{Plan, ReferencePlan},
+    plan::{Plan, ReferencePlan, Rule},
     reference::Reference,
-    rule::Rule,
     runs::{Round, Run, StudiedScene},
     surfaces::Surfaces,
     watch::Watch,

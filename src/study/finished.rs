@@ -5,8 +5,9 @@ use std::{collections::BTreeMap, fs, path::PathBuf};
 use super::{
     contender::Contender,
     engine::Study,
-    overhead, reference,
-    rule::Rule,
+    overhead,
+    plan::Rule,
+    reference,
     runs::{Conditions, Round, Run, run_stem},
 };
 use crate::{

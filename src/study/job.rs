@@ -5,8 +5,8 @@ use super::{
     engine::Study,
     folder::Folder,
     metrics::flip::mean_flip,
+    plan::Rule,
     reference::{Reference, exposure},
-    rule::Rule,
     runs::{Measurement, Run, run_stem},
     surfaces::Surfaces,
 };

@@ -1,7 +1,7 @@
 //! Comparisons of samplers as experiments.
 //!
 //! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a
-//! reference in two halves ([`engine`], [`job`], [`rule`], [`mod@reference`], [`reference_check`],
+//! reference in two halves ([`engine`], [`job`], [`mod@reference`], [`reference_check`],
 //! [`halves`], [`own_errors`], [`surfaces`], [`overhead`]), each kept as one of the [`runs`] in the report
 //! [`folder`] → figures over the seeds ([`summary`], [`quality`], [`statistics`]) → `results.json`,
 //! `results.csv` ([`results`]) and the page ([`report`]). [`metrics`] defines the errors.
@@ -23,7 +23,6 @@ mod reference;
 mod reference_check;
 pub(crate) mod report;
 pub(crate) mod results;
-mod rule;
 mod runs;
 pub mod statistics;
 mod summary;

@@ -11,7 +11,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{contender::Contender, own_errors::JUDGED_FROM, rule::Rule};
+use super::{contender::Contender, own_errors::JUDGED_FROM};
 use crate::{
     error::{Error, Result},
     files::extension,
@@ -175,6 +175,35 @@ impl CheckPlan {
             Self::Default => Sampler::Mis,
         };
         Some(Contender::plain(name))
+    }
+}
+
+/// Rule that ends a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Rule {
+    /// Samples per pixel.
+    Spp(u32),
+    /// Wall time of the passes, seconds.
+    Seconds(f64),
+}
+
+impl Rule {
+    pub(crate) fn time(time: Duration) -> Self {
+        Self::Seconds(time.as_secs_f64())
+    }
+
+    /// Returns "400 spp" or "30 s".
+    pub(crate) fn describe(self) -> String {
+        match self {
+            Self::Spp(spp) => format!("{spp} spp"),
+            Self::Seconds(seconds) => format!("{seconds} s"),
+        }
+    }
+
+    /// Returns "400spp" or "30s", for file names.
+    pub(crate) fn file_stem(self) -> String {
+        self.describe().replace(' ', "")
     }
 }
 

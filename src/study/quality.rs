@@ -221,8 +221,7 @@ mod tests {
     use crate::session::Figures;
     use crate::study::{
         own_errors::OwnErrors,
-        plan::{Description, Options},
-        rule::Rule,
+        plan::{Description, Options, Rule},
         runs::Conditions,
     };
 

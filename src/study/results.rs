@@ -8,9 +8,8 @@ use super::{
     engine::Results,
     folder::Folder,
     overhead::{Overhead, overheads},
-    plan::{Plan, PublishedErrors, PublishedOverhead},
+    plan::{Plan, PublishedErrors, PublishedOverhead, Rule},
     quality::{Figure, THRESHOLDS, Time, TimeToQuality, time_of_run, times_to_quality},
-    rule::Rule,
     runs::{Measurement, Round, Run, StudiedScene, assignments},
     summary::{Curve, Summary, curves, summaries},
 };

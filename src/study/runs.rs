@@ -8,9 +8,9 @@ use super::{
     contender::Contender,
     metrics::Metrics,
     own_errors::{OwnErrors, OwnParts, is_judged},
+    plan::Rule,
     reference::Reference,
     reference_check::ReferenceCheck,
-    rule::Rule,
     statistics::mean_standard_error,
     surfaces::{Parts, Surfaces},
 };

@@ -16,7 +16,7 @@ mod viewer;
 use std::fmt::Write;
 
 use super::{
-    folder::Folder, own_errors::JUDGED_FROM, reference_check::Verdict, results::Report, rule::Rule,
+    folder::Folder, own_errors::JUDGED_FROM, plan::Rule, reference_check::Verdict, results::Report,
     runs::StudiedScene,
 };
 use crate::{error::Result, files::write_text};

@@ -7,10 +7,9 @@ use super::html::{Table, count, escape, interval, number, percent, percent_added
 use crate::study::{
     metrics::parts::PartErrors,
     overhead::{Overhead, PassOverhead},
-    plan::PublishedErrors,
+    plan::{PublishedErrors, Rule},
     quality::{Figure, THRESHOLDS, TimeToQuality},
     results::Report,
-    rule::Rule,
     runs::distinct,
     statistics::Interval,
     summary::{SUSPICIOUS_DEVIATION, Summary},

@@ -5,7 +5,7 @@ use super::{
     tables::find,
 };
 use crate::study::{
-    reference_check::Verdict, results::Report, rule::Rule, runs::StudiedScene,
+    plan::Rule, reference_check::Verdict, results::Report, runs::StudiedScene,
     statistics::Interval, summary::Summary,
 };
 

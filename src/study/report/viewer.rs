@@ -6,7 +6,7 @@ use super::{
     html::{escape, number},
     pictures::{Picture, ScenePictures},
 };
-use crate::study::{falsecolour::Scale, rule::Rule, runs::StudiedScene};
+use crate::study::{falsecolour::Scale, plan::Rule, runs::StudiedScene};
 
 /// Steps of the false-colour legend.
 const RAMP_STEPS: u32 = 16;

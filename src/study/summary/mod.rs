@@ -8,8 +8,7 @@ use serde::Serialize;
 use super::{
     metrics::parts::PartErrors,
     own_errors::is_judged,
-    plan::Plan,
-    rule::Rule,
+    plan::{Plan, Rule},
     runs::{Measurement, Run, StudiedScene},
     statistics::{Interval, geometric_interval, mean_interval, slope},
     surfaces::Parts,
