@@ -1,21 +1,18 @@
 //! Files that the window writes: its picture, the film, and the camera.
 
-use std::{
-    fmt::Write,
-    path::{Path, PathBuf},
-};
+use std::{fmt::Write, path::PathBuf};
 
 use crate::{
     error::Result,
     files::write_text,
     film::{Image, png::write_rgb8},
-    scene::{Camera, Scene},
+    scene::Camera,
 };
 
 /// Number of written views that the window offers.
 const MOST_VIEWS: u32 = 99;
 
-/// Returns a camera as the table of a scene file.
+/// Returns a camera as a scene file without anything else.
 pub(super) fn camera_toml(camera: &Camera) -> String {
     // Shortest decimals that read back as the same numbers.
     let vector = |value: glam::Vec3| format!("[{:?}, {:?}, {:?}]", value.x, value.y, value.z);
@@ -47,14 +44,6 @@ pub(super) fn names(scene: &str) -> [PathBuf; 3] {
 pub(super) fn views(scene: &str) -> Vec<PathBuf> {
     let of = |number: u32| PathBuf::from(format!("{scene}.view-{number}.toml"));
     (1..=MOST_VIEWS).map(of).filter(|file| file.exists()).collect()
-}
-
-/// Reads a camera that [`camera_toml`] has written: of a scene without anything else.
-///
-/// # Errors
-/// A file that cannot be read, or holds no camera.
-pub(super) fn read_camera(path: &Path) -> Result<Camera> {
-    Scene::load(path).map(|scene| scene.camera)
 }
 
 /// Writes size and pixels of the window, the film to the left with its metadata, and the camera.

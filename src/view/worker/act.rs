@@ -7,6 +7,7 @@ use crate::{
     error::Result,
     files::write_text,
     sampler::Sampler,
+    scene::Scene,
     session::Settings,
     shader::constants::SHOW_PICTURE,
     terminal::say,
@@ -15,7 +16,7 @@ use crate::{
         keys::{Action, LAYERS},
         message::{Drag, Input, Setting},
         projector::Inset,
-        save::{camera_toml, names, read_camera, views, write},
+        save::{camera_toml, names, views, write},
         side::Side,
     },
 };
@@ -106,8 +107,8 @@ impl Worker {
                 camera.focus_distance = distance;
                 return Ok(camera.aperture_radius > 0.0);
             }
-            Setting::View(number) => match self.views.get(number).map(|file| read_camera(file)) {
-                Some(Ok(view)) => *camera = view,
+            Setting::View(number) => match self.views.get(number).map(|file| Scene::load(file)) {
+                Some(Ok(view)) => *camera = view.camera,
                 Some(Err(error)) => {
                     log::error!("{error}");
                     self.notice = error.to_string();
