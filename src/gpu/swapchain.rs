@@ -28,9 +28,8 @@ impl<T: HasWindowHandle + HasDisplayHandle + Send + Sync> Target for T {}
 /// Outcome of [`Swapchain::present`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Presented {
-    Shown,
-    /// The display had no room for it; the next one may be shown.
-    Skipped,
+    /// Shown, unless the display had no room for it: the next one may be shown.
+    Done,
     /// The window has another size now: [`Swapchain::resize`] comes first.
     Outdated,
     /// The window's surface is gone: [`Swapchain::renew`] comes first.
@@ -217,7 +216,7 @@ impl Swapchain {
     pub(crate) fn present(&mut self, pixels: &Buffer) -> Result<Presented> {
         let [width, height] = self.size;
         if self.images.is_empty() {
-            return Ok(Presented::Skipped);
+            return Ok(Presented::Done);
         }
         assert!(pixels.size() >= 4 * u64::from(width) * u64::from(height), "a pixel for each");
         let raw = &self.device.raw;
@@ -232,7 +231,7 @@ impl Swapchain {
         };
         let (index, is_suboptimal) = match acquired {
             Ok(acquired) => acquired,
-            Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(Presented::Skipped),
+            Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(Presented::Done),
             Err(result) => return outcome("vkAcquireNextImageKHR", result),
         };
         // SAFETY: the fence was handed to the call above, and is waited for before its reset.
@@ -252,7 +251,7 @@ impl Swapchain {
         let presented = unsafe { self.functions.queue_present(*queue, &info) };
         drop(queue);
         match presented {
-            Ok(false) if !is_suboptimal => Ok(Presented::Shown),
+            Ok(false) if !is_suboptimal => Ok(Presented::Done),
             Ok(_) => Ok(Presented::Outdated),
             Err(result) => outcome("vkQueuePresentKHR", result),
         }

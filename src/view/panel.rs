@@ -158,7 +158,7 @@ impl Panel {
             }
             let pixels = self.compose(size, self.swapchain.is_bgra())?;
             match self.swapchain.present(&pixels)? {
-                Presented::Shown | Presented::Skipped => return Ok(()),
+                Presented::Done => return Ok(()),
                 Presented::Outdated => self.swapchain.resize(self.size)?,
                 Presented::Lost => {
                     log::warn!("the window lost its surface; making another");
