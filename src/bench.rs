@@ -20,6 +20,7 @@ use crate::{
     accel::Accel,
     error::{Error, Result},
     gpu::{Buffer, DescriptorSet, Device},
+    math::median,
     pass::{
         Domain, Kernel, Pass, PathDemand, Recording, SceneBuffers, Schedule, Steps, WaveBuffers,
     },
@@ -29,7 +30,6 @@ use crate::{
         constants::NO_MATERIAL,
         structs::{Counters, Hit, Ray, ShadowRay, Wave},
     },
-    study::statistics::median,
 };
 
 /// Least number of rays that a CPU thread takes at a time.

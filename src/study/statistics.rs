@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::{film::reconstruction::variance_share, scene::Filter};
+use crate::{film::reconstruction::variance_share, math::median, scene::Filter};
 
 /// A value with its 95% confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -64,13 +64,6 @@ pub fn geometric_interval(values: &[f64]) -> Option<Interval> {
     }
     let logarithms: Vec<f64> = values.iter().map(|value| value.ln()).collect();
     mean_interval(&logarithms).map(|interval| interval.map(f64::exp))
-}
-
-/// Median of ascending values; 0 for none.
-pub fn median(ascending: &[f64]) -> f64 {
-    let last = ascending.len().saturating_sub(1);
-    let at = |index: usize| ascending.get(index).copied().unwrap_or(0.0);
-    0.5 * (at(last / 2) + at(last.div_ceil(2)))
 }
 
 /// Median with the narrowest pair of order statistics that holds the true median with at least 95%

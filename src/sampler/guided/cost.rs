@@ -8,7 +8,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::Result;
+use crate::{error::Result, math::median};
 
 /// Numbers of candidates that `guided` can choose a shadow ray from.
 pub const GUIDED_CANDIDATES: [u32; 3] = [1, 4, 8];
@@ -172,7 +172,7 @@ fn relative_variances(spreads: &[&Spread]) -> Option<Vec<RelativeVariance>> {
 /// vary, and their spread.
 fn log_ratio(variance: &RelativeVariance, other: &RelativeVariance) -> (f64, f64) {
     let pairs = variance.logarithms.iter().zip(&other.logarithms);
-    let differences: Vec<f64> =
+    let mut differences: Vec<f64> =
         pairs.map(|(a, b)| a - b).filter(|difference| difference.is_finite()).collect();
     let count = differences.len() as f64;
     if differences.is_empty() {
@@ -186,18 +186,8 @@ fn log_ratio(variance: &RelativeVariance, other: &RelativeVariance) -> (f64, f64
     } else {
         UNKNOWN_ERROR
     };
+    differences.sort_unstable_by(f64::total_cmp);
     (median(&differences), error)
-}
-
-/// The mean of the two middle values, of an even number.
-///
-/// # Panics
-/// If there are no values.
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
 }
 
 /// An arm in a race.
@@ -283,11 +273,6 @@ mod tests {
 
     use super::*;
     use crate::math::random::hash_4d;
-
-    #[test]
-    fn a_median_lies_between_the_middle_values() {
-        assert_eq!((median(&[8.0, 1.0, 4.0, 2.0]), median(&[9.0, 1.0, 2.0])), (3.0, 2.0));
-    }
 
     /// An arm whose samples are known: its time, and the deviation of its samples relative to their mean.
     #[derive(Clone, Copy)]
