@@ -100,19 +100,3 @@ impl ProductParameters {
         Ok(())
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn impossible_combinations_are_refused() {
-        let shares =
-            ProductParameters { brdf_share: 0.6, environment_share: 0.6, ..Default::default() };
-        assert!(shares.check().is_err());
-        let pairs =
-            ProductParameters { environment_lobes: 1000, brdf_lobes: 64, ..Default::default() };
-        let message = pairs.check().map_or_else(|error| error.to_string(), |()| String::new());
-        assert!(message.contains("64000 products"), "{message}");
-    }
-}

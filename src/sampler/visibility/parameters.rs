@@ -65,17 +65,3 @@ impl VisibilityParameters {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn caches_of_pixels_need_direct_light() {
-        let pixel =
-            VisibilityParameters { cache: CacheScope::Pixel, ..VisibilityParameters::default() };
-        let message = pixel.check(2).map_or_else(|error| error.to_string(), |()| String::new());
-        assert!(message.contains("--depth 2"), "{message}");
-        assert!(pixel.check(1).is_ok() && VisibilityParameters::default().check(2).is_ok());
-    }
-}
