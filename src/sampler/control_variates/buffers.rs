@@ -31,11 +31,6 @@ impl RecordBuffers {
         let set = DescriptorSet::new(device, &control_variates::TABLE, &bound)?;
         Ok(Self { set, grid, counts, visibilities })
     }
-
-    /// Reads rays and visible rays of every entry. Fails if the device does.
-    pub fn counts(&self) -> Result<Vec<[u32; 2]>> {
-        self.counts.download(self.grid.entries())
-    }
 }
 
 impl Tables for RecordBuffers {
@@ -50,7 +45,7 @@ impl Tables for RecordBuffers {
     }
 
     fn freeze(&self) -> Result<()> {
-        let expected = self.grid.expected(&self.counts()?);
+        let expected = self.grid.expected(&self.counts.download(self.grid.entries())?);
         self.visibilities.upload(bytemuck::cast_slice(&expected))
     }
 }

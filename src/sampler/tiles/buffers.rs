@@ -23,7 +23,8 @@ pub struct TileBuffers {
 }
 
 impl TileBuffers {
-    /// Uploads the tiles, with nothing learned of them. Fails if the device does or its limits are exceeded.
+    /// Uploads the tiles. Counts and entries are of undefined content. Fails if the device does or its limits
+    /// are exceeded.
     pub fn new(
         device: &Arc<Device>,
         partition: &Partition,
@@ -45,14 +46,7 @@ impl TileBuffers {
             (tiles::TILE_OF_CELL, &of_cell),
         ];
         let set = DescriptorSet::new(device, &tiles::TABLE, &bound)?;
-        let buffers = Self { set, grid, cache, counts, entries };
-        buffers.forget()?;
-        Ok(buffers)
-    }
-
-    /// Reads rays and their summed squares of cosines by sector and tile. Fails if the device does.
-    pub fn counts(&self) -> Result<Vec<[u32; 2]>> {
-        self.counts.download(self.grid.sectors() * self.cache.tiles())
+        Ok(Self { set, grid, cache, counts, entries })
     }
 
     /// Replaces the entries of all sectors. Fails if the device does.
@@ -74,6 +68,7 @@ impl Tables for TileBuffers {
     }
 
     fn freeze(&self) -> Result<()> {
-        self.upload(&self.cache.learned(self.grid, &self.counts()?))
+        let counts = self.counts.download(self.grid.sectors() * self.cache.tiles())?;
+        self.upload(&self.cache.learned(self.grid, &counts))
     }
 }
