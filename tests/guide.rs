@@ -5,7 +5,7 @@
 use fenestra::{
     math::random::{hash_4d, random_independent_2d},
     sampler::guided::{ARRIVAL_DIRECTIONS, CellKey, Guide, decode_entry, decode_visibility},
-    sampler::regions::{FACE_COUNT, PARENT_COUNT, Partition},
+    sampler::regions::{FACE_COUNT, PARENT_COUNT, Partition, Rectangle, Region},
     scene::environment::{EnvironmentMap, EnvironmentTables},
     shader::{
         rooms::guided::{self, GUIDE_NO_KEY, GUIDE_REFINED, GUIDE_RESPONSE_UNITS},
@@ -39,24 +39,19 @@ fn regions_are_nested_rectangles_that_fill_the_map() {
     let coarse = Partition::new(&map, PARENT_COUNT);
     let fine = Partition::new(&map, 256);
     assert_eq!((coarse.regions.len(), fine.regions.len()), (PARENT_COUNT, 256));
-    let (width, rows) = (fine.width, fine.rows);
-    assert_eq!((width, rows), (map.width, map.height + 1));
-    let mut covered = vec![0; fine.region_of_cell.len()];
-    for (index, region) in fine.regions.iter().enumerate() {
-        for row in region.first[1]..region.first[1] + region.size[1] {
-            for column in region.first[0]..region.first[0] + region.size[0] {
-                let cell = (row * width + column) as usize;
+    let mut covered = vec![0; (map.width * (map.height + 1)) as usize];
+    for (index, Region { rectangle, .. }) in fine.regions.iter().enumerate() {
+        for row in rectangle.rows() {
+            for cell in rectangle.cells(row, map.width as usize) {
                 covered[cell] += 1;
                 assert_eq!(usize::from(fine.region_of_cell[cell]), index);
                 let parent = usize::from(coarse.region_of_cell[cell]);
-                assert_eq!(region.parent, parent, "the first 64 rectangles are the parents");
+                assert_eq!(rectangle.parent, parent, "the first 64 rectangles are the parents");
             }
         }
     }
     assert!(covered.iter().all(|count| *count == 1), "every cell lies in one region");
-    let sum = |value: &dyn Fn(&fenestra::sampler::regions::Region) -> f64| -> f64 {
-        fine.regions.iter().map(value).sum()
-    };
+    let sum = |value: &dyn Fn(&Region) -> f64| -> f64 { fine.regions.iter().map(value).sum() };
     assert!((sum(&|region| region.share) - 1.0).abs() < 1e-12);
     assert!((sum(&|region| region.solid_angle) - 1.0).abs() < 1e-12);
     let brightest = fine.regions.iter().max_by(|a, b| a.share.total_cmp(&b.share)).unwrap();
@@ -70,7 +65,7 @@ fn small_and_black_maps_have_fewer_regions() {
     let tiny = scenes::environment(4, |_| Vec3::ONE);
     let partition = Partition::new(&tiny, 256);
     assert_eq!(partition.regions.len(), 4 * 3);
-    let parents = partition.regions.iter().map(|region| region.parent);
+    let parents = partition.regions.iter().map(|region| region.rectangle.parent);
     assert!(parents.eq(0..4 * 3));
     let black = Partition::new(&scenes::environment(16, |_| Vec3::ZERO), 256);
     assert_eq!(black.regions.len(), 1);
@@ -99,7 +94,7 @@ fn regions_are_split_again_where_they_matter() {
     assert!(in_the_east(&before) < 180 && in_the_east(&after) > 220, "{}", in_the_east(&after));
     let sum: f64 = after.regions.iter().map(|region| region.share).sum();
     assert!((sum - 1.0).abs() < 1e-12);
-    assert!(after.regions.iter().all(|region| region.parent < PARENT_COUNT));
+    assert!(after.regions.iter().all(|region| region.rectangle.parent < PARENT_COUNT));
     // Uniform importance restores the first regions, to the bit.
     let again = after.split_by(&[1.0; 256], 256).unwrap();
     assert_eq!((&again.regions, &again.entries), (&before.regions, &before.entries));
@@ -182,14 +177,14 @@ fn the_density_integrates_to_one_over_every_region() {
     // variation of the sine, which the density divides by.
     let offsets = [0.5 - 0.5 / 3.0_f64.sqrt(), 0.5 + 0.5 / 3.0_f64.sqrt()];
     let (width, height) = (f64::from(map.width), f64::from(map.height));
-    for row in 0..partition.rows {
+    for row in 0..=map.height {
         let (top, extent) = match row {
             0 => (0.0, 0.5),
             row if row == map.height => (height - 0.5, 0.5),
             row => (f64::from(row) - 0.5, 1.0),
         };
-        for column in 0..partition.width {
-            let region = partition.region_of_cell[(row * partition.width + column) as usize];
+        for column in 0..map.width {
+            let region = partition.region_of_cell[(row * map.width + column) as usize];
             for (dx, dy) in offsets.iter().flat_map(|x| offsets.iter().map(move |y| (*x, *y))) {
                 let u = ((f64::from(column) + 0.5 + dx) / width).fract();
                 let v = (top + extent * dy) / height;
@@ -225,7 +220,8 @@ fn samples_of_a_region_have_its_density() {
     let tables = EnvironmentTables::new(&map);
     let partition = Partition::new(&map, 64);
     for (index, region) in partition.regions.iter().enumerate().step_by(5) {
-        let count = region.size[0] * region.size[1];
+        let Rectangle { first, size, .. } = region.rectangle;
+        let count = size[0] * size[1];
         if region.share <= 0.0 || count < 4 {
             continue;
         }
@@ -237,16 +233,14 @@ fn samples_of_a_region_have_its_density() {
             let above = if cell[1] > 0 { row[cell[1] as usize - 1] } else { 0.0 };
             f64::from(column[cell[0] as usize] - before) * f64::from(row[cell[1] as usize] - above)
         };
-        let cell_of = |index: u32| {
-            [region.first[0] + index % region.size[0], region.first[1] + index / region.size[0]]
-        };
+        let cell_of = |index: u32| [first[0] + index % size[0], first[1] + index / size[0]];
         let expected: Vec<f64> = (0..count).map(|index| energy(cell_of(index))).collect();
         let mut observed = vec![0.0; count as usize];
         for sample in 0..20_000 {
             let bits = hash_4d([sample, index as u32, 7, 1]);
             let cell = choose_cell(&partition, index, [bits[0], bits[1]]);
-            let local = [cell[0] - region.first[0], cell[1] - region.first[1]];
-            observed[(local[1] * region.size[0] + local[0]) as usize] += 1.0;
+            let local = [cell[0] - first[0], cell[1] - first[1]];
+            observed[(local[1] * size[0] + local[0]) as usize] += 1.0;
             if sample < 50 {
                 let u = random_independent_2d(sample, 0, index as u32, 2);
                 let drawn = tables.sample_cell(&map, cell, u);

@@ -73,7 +73,7 @@ impl RegionTables {
         };
         Self {
             shares: partition.regions.iter().map(|region| region.share).collect(),
-            parents: partition.regions.iter().map(|region| region.parent as u8).collect(),
+            parents: partition.regions.iter().map(|region| region.rectangle.parent as u8).collect(),
             facing: (0..FACE_COUNT).map(facing_of).collect(),
         }
     }

@@ -10,4 +10,4 @@ mod split;
 pub use cells::{FACE_COUNT, face_normal};
 pub(super) use cells::{bounds_of, cell_edges};
 pub use partition::{MAX_REGIONS, Partition, Region};
-pub use split::PARENT_COUNT;
+pub use split::{PARENT_COUNT, Rectangle};

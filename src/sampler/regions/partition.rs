@@ -29,30 +29,19 @@ pub const MAX_REGIONS: usize = 1024;
 /// Scale of the thresholds of the alias tables.
 pub const CELL_SCALE: u64 = 1 << 32;
 
-/// A rectangle of cells.
+/// A rectangle of cells, and what is drawn in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
-    /// First column and row of cells.
-    pub first: [u32; 2],
-    /// Columns and rows of cells.
-    pub size: [u32; 2],
+    /// The rectangle.
+    pub rectangle: Rectangle,
     /// P_region, the share of the map's energy ∫ lum L dω.
     pub share: f64,
     /// Solid angle as a fraction of the sphere.
     pub solid_angle: f64,
     /// Unit mean direction in the world, weighted by energy.
     pub direction: DVec3,
-    /// Index of the parent among the first [`PARENT_COUNT`] rectangles.
-    pub parent: usize,
     /// First entry of the region's alias table.
     pub first_entry: usize,
-}
-
-impl Region {
-    fn rectangle(&self) -> Rectangle {
-        let [first, size] = [self.first, self.size].map(|pair| pair.map(|value| value as usize));
-        Rectangle { first, size, parent: self.parent }
-    }
 }
 
 /// A map split into regions.
@@ -64,10 +53,6 @@ pub struct Partition {
     pub entries: Vec<AliasEntry>,
     /// Region of every cell, `height + 1` rows of `width`.
     pub region_of_cell: Vec<u16>,
-    /// Columns of cells.
-    pub width: u32,
-    /// Rows of cells, one more than the map has.
-    pub rows: u32,
     cells: Arc<MapCells>,
 }
 
@@ -102,8 +87,8 @@ impl Partition {
     /// devices read them.
     pub(in crate::sampler) fn tables(&self) -> (Vec<[u32; 4]>, Vec<[u32; 2]>) {
         let regions = self.regions.iter().map(|region| {
-            let first = region.first[0] | region.first[1] << 16;
-            [region.first_entry as u32, region.size[0], region.size[1], first]
+            let Rectangle { first: [column, row], size: [columns, rows], .. } = region.rectangle;
+            [region.first_entry as u32, columns, rows, column | row << 16]
         });
         let aliases = self
             .entries
@@ -115,8 +100,9 @@ impl Partition {
     /// Returns first column and row, columns, rows and parent of every region, for a file.
     pub fn rectangles(&self) -> Vec<[u32; 5]> {
         let of = |region: &Region| {
-            let ([column, row], [columns, rows]) = (region.first, region.size);
-            [column, row, columns, rows, region.parent as u32]
+            let Rectangle { first: [column, row], size: [columns, rows], parent } =
+                region.rectangle;
+            [column, row, columns, rows, parent as u32]
         };
         self.regions.iter().map(of).collect()
     }
@@ -124,7 +110,7 @@ impl Partition {
     /// Splits the same map into regions that [`Self::rectangles`] returned. `None` unless they
     /// cover the map without overlap and are no more than [`MAX_REGIONS`].
     pub fn with_rectangles(&self, rectangles: &[[u32; 5]]) -> Option<Self> {
-        let (width, rows) = (self.width, self.rows);
+        let [width, rows] = [self.cells.width, self.cells.rows].map(|count| count as u32);
         let mut is_covered = vec![false; self.region_of_cell.len()];
         let mut found = Vec::with_capacity(rectangles.len());
         for &[column, row, columns, count, parent] in rectangles {
@@ -136,13 +122,10 @@ impl Partition {
             if !is_inside {
                 return None;
             }
-            let rectangle = Rectangle {
-                first: [column as usize, row as usize],
-                size: [columns as usize, count as usize],
-                parent: parent as usize,
-            };
+            let (first, size) = ([column, row], [columns, count]);
+            let rectangle = Rectangle { first, size, parent: parent as usize };
             for row in rectangle.rows() {
-                for cell in &mut is_covered[rectangle.cells(row, width as usize)] {
+                for cell in &mut is_covered[rectangle.cells(row, self.cells.width)] {
                     if std::mem::replace(cell, true) {
                         return None;
                     }
@@ -160,7 +143,7 @@ impl Partition {
         let width = self.cells.width;
         let shares = |region: &Region| {
             let mut energy = vec![0.0; other.regions.len()];
-            let rectangle = region.rectangle();
+            let rectangle = region.rectangle;
             for cells in rectangle.rows().map(|row| rectangle.cells(row, width)) {
                 let others = &other.region_of_cell[cells.clone()];
                 for (other, cell) in others.iter().zip(&self.cells.energy[cells]) {
@@ -185,7 +168,8 @@ impl Partition {
         let tables: Vec<(f64, DVec3, Vec<AliasEntry>)> = rectangles
             .par_iter()
             .map(|rectangle| {
-                let mut weights = Vec::with_capacity(rectangle.size[0] * rectangle.size[1]);
+                let mut weights =
+                    Vec::with_capacity((rectangle.size[0] * rectangle.size[1]) as usize);
                 for row in rectangle.rows() {
                     weights.extend_from_slice(&cells.energy[rectangle.cells(row, cells.width)]);
                 }
@@ -201,30 +185,21 @@ impl Partition {
         let mut entries = Vec::with_capacity(cells.energy.len());
         for (rectangle, (sum, direction, table)) in rectangles.iter().zip(tables) {
             regions.push(Region {
-                first: rectangle.first.map(|value| value as u32),
-                size: rectangle.size.map(|value| value as u32),
+                rectangle: *rectangle,
                 share: if energy > 0.0 { sum / energy } else { 0.0 },
                 solid_angle: cells.row_angle[rectangle.rows()].iter().sum::<f64>()
-                    * rectangle.size[0] as f64,
+                    * f64::from(rectangle.size[0]),
                 direction,
-                parent: rectangle.parent,
                 first_entry: entries.len(),
             });
             entries.extend(table);
         }
-        Self {
-            regions,
-            entries,
-            region_of_cell,
-            width: cells.width as u32,
-            rows: cells.rows as u32,
-            cells,
-        }
+        Self { regions, entries, region_of_cell, cells }
     }
 
     /// Index of the region of `map` that holds a unit direction.
     pub fn region_of(&self, map: &EnvironmentMap, direction: Vec3) -> usize {
         let (column, row, _) = map.locate(direction);
-        usize::from(self.region_of_cell[(row * self.width + column) as usize])
+        usize::from(self.region_of_cell[row as usize * self.cells.width + column as usize])
     }
 }

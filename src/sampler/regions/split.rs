@@ -71,7 +71,7 @@ impl MapCells {
         for row in rectangle.rows() {
             let theta = pi * row as f64 / (self.rows - 1) as f64;
             let (sin_theta, cos_theta) = theta.sin_cos();
-            for column in rectangle.first[0]..rectangle.first[0] + rectangle.size[0] {
+            for column in rectangle.columns() {
                 let (sin_azimuth, cos_azimuth) = self.azimuth[column];
                 let weight =
                     if dark { self.row_angle[row] } else { self.energy[row * self.width + column] };
@@ -119,8 +119,8 @@ impl<'a> SummedAreas<'a> {
 
     /// Cost of a rectangle, E^¼ Ω^¾.
     fn cost(&self, rectangle: Rectangle) -> f64 {
-        let [c0, r0] = rectangle.first;
-        let [c1, r1] = [c0 + rectangle.size[0], r0 + rectangle.size[1]];
+        let (Range { start: c0, end: c1 }, Range { start: r0, end: r1 }) =
+            (rectangle.columns(), rectangle.rows());
         let at = |column: usize, row: usize| self.sums[row * (self.cells.width + 1) + column];
         let of = |index: usize| {
             (at(c1, r1)[index] - at(c0, r1)[index] - at(c1, r0)[index] + at(c0, r0)[index]).max(0.0)
@@ -134,15 +134,15 @@ impl<'a> SummedAreas<'a> {
         let [columns, rows] = rectangle.size;
         let middle = rectangle.first[1] + rows / 2;
         let pi = std::f64::consts::PI;
-        let sine = (pi * middle as f64 / (self.cells.rows - 1) as f64).sin().max(1e-3);
-        let width = columns as f64 * 2.0 * pi / self.cells.width as f64 * sine;
-        let height = rows as f64 * pi / (self.cells.rows - 1) as f64;
+        let sine = (pi * f64::from(middle) / (self.cells.rows - 1) as f64).sin().max(1e-3);
+        let width = f64::from(columns) * 2.0 * pi / self.cells.width as f64 * sine;
+        let height = f64::from(rows) * pi / (self.cells.rows - 1) as f64;
         let axis = usize::from(columns == 1 || (rows > 1 && height > width));
         let length = rectangle.size[axis];
         if length < 2 {
             return None;
         }
-        let halves = |at: usize| {
+        let halves = |at: u32| {
             let (mut low, mut high) = (rectangle, rectangle);
             low.size[axis] = at;
             high.first[axis] += at;
@@ -152,7 +152,7 @@ impl<'a> SummedAreas<'a> {
         // Bisect: the difference of the costs grows with the position.
         let (mut first, mut last) = (1, length - 1);
         while first < last {
-            let at = usize::midpoint(first, last);
+            let at = u32::midpoint(first, last);
             let [low, high] = halves(at);
             if self.cost(low) < self.cost(high) {
                 first = at + 1;
@@ -165,25 +165,36 @@ impl<'a> SummedAreas<'a> {
 }
 
 /// A rectangle of cells.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rectangle {
     /// First column and row of cells.
-    pub first: [usize; 2],
+    pub first: [u32; 2],
     /// Number of columns and rows.
-    pub size: [usize; 2],
-    /// Index of the parent region.
+    pub size: [u32; 2],
+    /// Index of the parent among the first [`PARENT_COUNT`] rectangles.
     pub parent: usize,
 }
 
 impl Rectangle {
+    fn along(&self, axis: usize) -> Range<usize> {
+        let first = self.first[axis] as usize;
+        first..first + self.size[axis] as usize
+    }
+
+    /// Range of its columns.
+    pub fn columns(&self) -> Range<usize> {
+        self.along(0)
+    }
+
     /// Range of its rows.
     pub fn rows(&self) -> Range<usize> {
-        self.first[1]..self.first[1] + self.size[1]
+        self.along(1)
     }
 
     /// Indices of its cells in a row of the map.
     pub fn cells(&self, row: usize, width: usize) -> Range<usize> {
-        row * width + self.first[0]..row * width + self.first[0] + self.size[0]
+        let Range { start, end } = self.columns();
+        row * width + start..row * width + end
     }
 }
 
@@ -197,7 +208,8 @@ fn list_order(next: &[usize]) -> Vec<usize> {
 /// Returns them in the order of the tree, so that neighbours in that order are mostly neighbours in
 /// the map.
 pub fn split_greedily(sums: &SummedAreas, region_count: usize) -> Vec<Rectangle> {
-    let whole = Rectangle { first: [0, 0], size: [sums.cells.width, sums.cells.rows], parent: 0 };
+    let size = [sums.cells.width, sums.cells.rows].map(|count| count as u32);
+    let whole = Rectangle { first: [0, 0], size, parent: 0 };
     let mut rectangles = vec![whole];
     // Next rectangle in the order of the tree
     let mut next = vec![usize::MAX];
