@@ -93,7 +93,7 @@ fn loader(shared: &SharedStruct) -> String {
     text + &format!(" return {}({}); }}", shared.name, members.collect::<Vec<_>>().join(", "))
 }
 
-/// GLSL of every struct with a macro that loads it, and a macro for every buffer.
+/// GLSL of every struct with a macro that loads it, and macros for every buffer and its place.
 fn interface() -> String {
     let mut text = String::new();
     for shared in rooms::structs() {
@@ -106,19 +106,20 @@ fn interface() -> String {
     for binding in rooms::tables().flat_map(|table| table.bindings) {
         let Binding { set, number, kind, .. } = *binding;
         let name = binding.glsl_name();
+        let place = format!("set = {set}, binding = {number}");
+        let _ = writeln!(text, "#define PLACE_{name} {place}");
         let buffer = |element: &str, brackets: &str| {
             format!(
-                "BUFFER_{name}(access) layout(scalar, set = {set}, binding = {number}) access buffer \
-                 {name}_buffer {{ {element} {name}{brackets}; }};"
+                "BUFFER_{name}(access) layout(scalar, {place}) access buffer {name}_buffer \
+                 {{ {element} {name}{brackets}; }};"
             )
         };
         let declaration = match kind {
             Kind::One(element) => buffer(element, ""),
             Kind::Array(element) => buffer(element, "[]"),
-            Kind::Texels(format) => format!(
-                "TEXELS_{name} layout(set = {set}, binding = {number}) uniform {} {name};",
-                format.sampler()
-            ),
+            Kind::Texels(format) => {
+                format!("TEXELS_{name} layout({place}) uniform {} {name};", format.sampler())
+            }
         };
         let _ = writeln!(text, "#define {declaration}");
     }
@@ -141,10 +142,6 @@ fn compile_all() -> Result<(), String> {
     let [red, green, blue] = constants::LUMINANCE_WEIGHTS;
     let weights = format!("vec3({red}, {green}, {blue})");
     options.add_macro_definition("LUMINANCE_WEIGHTS", Some(&weights));
-    for table in rooms::tables() {
-        let name = format!("SET_{}", table.name.to_uppercase());
-        options.add_macro_definition(&name, Some(&table.set.to_string()));
-    }
     let interface = interface();
     // Includes that the shader under way has had: each is given once, so that they need no guards.
     let included = Rc::new(RefCell::new(BTreeSet::new()));

@@ -4,10 +4,10 @@
 
 // Runs `answer` on every Query and writes the Answer.
 #define ANSWER_QUERIES(Query, Answer, answer) \
-    layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Queries { \
+    layout(scalar, PLACE_probe_input) readonly buffer Queries { \
         Query queries[]; \
     }; \
-    layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers { \
+    layout(scalar, PLACE_probe_output) writeonly buffer Answers { \
         Answer answers[]; \
     }; \
     void main() { \

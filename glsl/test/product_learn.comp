@@ -11,7 +11,7 @@ READS(visibility)
 #include "product/mixture.glsl"
 #include "visibility/blocked.glsl"
 
-layout(scalar, set = SET_PROBE, binding = 33) writeonly buffer Answers {
+layout(scalar, PLACE_probe_output) writeonly buffer Answers {
     float densities[];
 };
 

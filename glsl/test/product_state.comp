@@ -16,7 +16,7 @@ struct PathInput {
     uint is_visible;
 };
 
-layout(scalar, set = SET_PROBE, binding = 32) readonly buffer Inputs {
+layout(scalar, PLACE_probe_input) readonly buffer Inputs {
     PathInput inputs[];
 };
 

@@ -2,8 +2,10 @@
 //!
 //! Sets go by rate of change: 0 the scene, 1 the sampler, 2 the wave, 3 the film. Set 1 has a table for
 //! each room of samplers ([`rooms`](super::rooms)), one for what pixels share and one for the window;
-//! disjoint numbers tell the table of a shader. GLSL names are in lower case; shaders say `READS(hits)`,
-//! `WRITES(rays)`, `UPDATES(paths)` or `TEXELS(hit_texels)`.
+//! no two buffers have the same number, which tells the table of a shader. GLSL names are in lower case;
+//! shaders say `READS(hits)`, `WRITES(rays)`, `UPDATES(paths)` or `TEXELS(hit_texels)`.
+
+use super::constants::place;
 
 /// A descriptor set: its number and its buffers.
 #[derive(Clone, Copy, Debug)]
@@ -101,9 +103,9 @@ macro_rules! kind {
 }
 pub(crate) use kind;
 
-/// Declares the buffers of a room in descriptor set `$set`, which `$number` numbers by their names.
+/// Declares the buffers of a table in descriptor set `$set`, which `$number` numbers by their names.
 macro_rules! buffers {
-    ($set:path, $number:path; $($(#[doc = $doc:literal])* $name:ident: $kind:ident $of:ident;)*) => {
+    ($set:expr, $number:path; $($(#[doc = $doc:literal])* $name:ident: $kind:ident $of:ident;)*) => {
         /// Names of the buffers, in the order of declaration.
         pub const BUFFER_NAMES: &[&str] = &[$(stringify!($name)),*];
         /// Every buffer.
@@ -121,234 +123,227 @@ macro_rules! buffers {
 pub(crate) use buffers;
 
 macro_rules! binding_tables {
-    ($($(#[$table_doc:meta])* $table:ident = $module:ident: $set:literal {
-        $($(#[doc = $doc:literal])* $number:literal $name:ident: $kind:ident $of:ident;)*
-    })*) => {
+    ($($(#[$doc:meta])* $table:ident = $module:ident: $set:literal { $($buffers:tt)* })*) => {
         $(
-            $(#[$table_doc])*
+            $(#[$doc])*
             pub mod $module {
-                use super::*;
-
-                $($(#[doc = $doc])* pub const $name: Binding = Binding {
-                    set: $set,
-                    number: $number,
-                    name: stringify!($name),
-                    kind: kind!($kind $of),
-                    about: concat!($($doc),*),
-                };)*
+                buffers! { $set, super::number; $($buffers)* }
             }
 
-            $(#[$table_doc])*
-            pub const $table: BindingTable = BindingTable {
-                name: stringify!($module),
-                set: $set,
-                bindings: &[$($module::$name),*],
-            };
+            $(#[$doc])*
+            pub const $table: BindingTable =
+                BindingTable { name: stringify!($module), set: $set, bindings: $module::BUFFERS };
         )*
 
         /// Every table but those of rooms.
         pub const TABLES: &[&BindingTable] = &[$(&$table),*];
+        const BUFFER_NAMES: &[&[&str]] = &[$($module::BUFFER_NAMES),*];
     };
+}
+
+/// Number of a buffer that belongs to no room, its place among all of these; those of rooms follow.
+const fn number(name: &str) -> u32 {
+    place(BUFFER_NAMES, name)
 }
 
 binding_tables! {
     /// Set 0: the scene, constant during a render.
     SCENE = scene: 0 {
         /// Camera, film, crop window and environment.
-        0 PARAMETERS: one SceneParameters;
+        PARAMETERS: one SceneParameters;
         /// Nodes of the wide BVH, five texels a node.
-        1 BVH_NODES: texels Rgba32Uint;
+        BVH_NODES: texels Rgba32Uint;
         /// First page of triangles in BVH order, three texels a triangle.
-        2 TRIANGLES_0: texels Rgba32Uint;
+        TRIANGLES_0: texels Rgba32Uint;
         /// Second page of triangles; a missing page repeats the first.
-        3 TRIANGLES_1: texels Rgba32Uint;
+        TRIANGLES_1: texels Rgba32Uint;
         /// Third page of triangles.
-        4 TRIANGLES_2: texels Rgba32Uint;
+        TRIANGLES_2: texels Rgba32Uint;
         /// Fourth page of triangles.
-        5 TRIANGLES_3: texels Rgba32Uint;
+        TRIANGLES_3: texels Rgba32Uint;
         /// Cells of four halves of the BRDF tables: `brdf_table` again.
-        6 BRDF_CELLS: texels Rgba16Float;
+        BRDF_CELLS: texels Rgba16Float;
         /// Material index of each triangle in BVH order.
-        7 TRIANGLE_MATERIALS: array uint;
+        TRIANGLE_MATERIALS: array uint;
         /// Materials.
-        8 MATERIALS: array Material;
+        MATERIALS: array Material;
         /// Words of the BRDF tables, addressed by offsets in the materials.
-        9 BRDF_TABLE: texels R32Float;
+        BRDF_TABLE: texels R32Float;
         /// Radiance of each texel of the environment map, and its compensated luminance.
-        10 ENVIRONMENT_TEXELS: texels Rgba32Float;
+        ENVIRONMENT_TEXELS: texels Rgba32Float;
         /// Cumulative probability over the rows of cells of the environment map.
-        11 ENVIRONMENT_ROWS: texels R32Float;
+        ENVIRONMENT_ROWS: texels R32Float;
         /// Cumulative probability over the cells of each row.
-        12 ENVIRONMENT_CELLS: texels R32Float;
+        ENVIRONMENT_CELLS: texels R32Float;
         /// Materials again, four texels each.
-        13 MATERIAL_TEXELS: texels Rgba32Uint;
+        MATERIAL_TEXELS: texels Rgba32Uint;
         /// Alias table over lamps and emitting triangles.
-        14 LAMP_CHOICES: array LampChoice;
+        LAMP_CHOICES: array LampChoice;
         /// Lights without a surface.
-        15 LAMPS: array Lamp;
+        LAMPS: array Lamp;
         /// First entry of the list of each cell and cube face.
-        16 LAMP_CELLS: array uint;
+        LAMP_CELLS: array uint;
         /// Lists of lamps.
-        17 LAMP_ENTRIES: array LampEntry;
+        LAMP_ENTRIES: array LampEntry;
         /// `environment_rows` of the compensated density.
-        18 COMPENSATED_ROWS: texels R32Float;
+        COMPENSATED_ROWS: texels R32Float;
         /// `environment_cells` of the compensated density.
-        19 COMPENSATED_CELLS: texels R32Float;
+        COMPENSATED_CELLS: texels R32Float;
         /// First page of the texels of all textures: a word a texel of bytes, two words a deeper one.
-        20 TEXTURE_WORDS_0: texels R32Uint;
+        TEXTURE_WORDS_0: texels R32Uint;
         /// Second page of texels; a missing page repeats the first.
-        21 TEXTURE_WORDS_1: texels R32Uint;
+        TEXTURE_WORDS_1: texels R32Uint;
         /// Third page of texels.
-        22 TEXTURE_WORDS_2: texels R32Uint;
+        TEXTURE_WORDS_2: texels R32Uint;
         /// Fourth page of texels.
-        23 TEXTURE_WORDS_3: texels R32Uint;
+        TEXTURE_WORDS_3: texels R32Uint;
         /// Textures as the properties of materials read them, a `TextureUse` of four texels each.
-        25 TEXTURE_USE_TEXELS: texels Rgba32Uint;
+        TEXTURE_USE_TEXELS: texels Rgba32Uint;
         /// Textures, opacity and emission of each material, a `MaterialSurface` of four texels each.
-        27 MATERIAL_SURFACE_TEXELS: texels Rgba32Uint;
+        MATERIAL_SURFACE_TEXELS: texels Rgba32Uint;
         /// First page of what `CONSTANT_ATTRIBUTES` names for the three corners of each triangle in BVH
         /// order.
-        28 TRIANGLE_ATTRIBUTES_0: texels R32Uint;
+        TRIANGLE_ATTRIBUTES_0: texels R32Uint;
         /// Second page of attributes; a missing page repeats the first.
-        29 TRIANGLE_ATTRIBUTES_1: texels R32Uint;
+        TRIANGLE_ATTRIBUTES_1: texels R32Uint;
         /// Third page of attributes.
-        30 TRIANGLE_ATTRIBUTES_2: texels R32Uint;
+        TRIANGLE_ATTRIBUTES_2: texels R32Uint;
         /// Fourth page of attributes.
-        31 TRIANGLE_ATTRIBUTES_3: texels R32Uint;
+        TRIANGLE_ATTRIBUTES_3: texels R32Uint;
         /// Instances in the order of the upper level of the tree, eight texels each.
-        32 INSTANCES: texels Rgba32Uint;
+        INSTANCES: texels Rgba32Uint;
         /// Cluster of each placed triangle that emits.
-        33 LAMP_CLUSTERS: array uint;
+        LAMP_CLUSTERS: array uint;
         /// Cryptomatte's identifier of the object of each triangle in BVH order, where it is placed.
-        34 TRIANGLE_OBJECTS: array uint;
+        TRIANGLE_OBJECTS: array uint;
         /// That of the object of each instance, in the order of the scene.
-        35 INSTANCE_OBJECTS: array uint;
+        INSTANCE_OBJECTS: array uint;
         /// That of each material.
-        36 MATERIAL_IDENTIFIERS: array uint;
+        MATERIAL_IDENTIFIERS: array uint;
     }
 
     /// Set 1 of the passes by which pixels share paths.
     SHARING = sharing: 1 {
         /// First vertex of each path.
-        40 FIRST_VERTICES: array FirstVertex;
+        FIRST_VERTICES: array FirstVertex;
         /// First vertices again, six texels each.
-        41 FIRST_VERTEX_TEXELS: texels Rgba32Uint;
+        FIRST_VERTEX_TEXELS: texels Rgba32Uint;
         /// Second vertex of each path.
-        42 SECOND_VERTICES: array SecondVertex;
+        SECOND_VERTICES: array SecondVertex;
         /// Offer of each path to the pixels of its cohort.
-        43 OFFERS: array Offer;
+        OFFERS: array Offer;
         /// Offers again, six texels each.
-        44 OFFER_TEXELS: texels Rgba32Uint;
+        OFFER_TEXELS: texels Rgba32Uint;
         /// Weight of each offer.
-        45 OFFER_WEIGHTS: array float;
+        OFFER_WEIGHTS: array float;
         /// Weights of offers again.
-        46 OFFER_WEIGHT_TEXELS: texels R32Float;
+        OFFER_WEIGHT_TEXELS: texels R32Float;
         /// Connections of path `i` with the offer of pixel `k` of its cohort at `k · path_count + i`.
-        47 CONNECTIONS: array Connection;
+        CONNECTIONS: array Connection;
         /// Connections again, one texel each.
-        48 CONNECTION_TEXELS: texels Rgba32Float;
+        CONNECTION_TEXELS: texels Rgba32Float;
         /// Bits of the pixels of the cohort whose offers each path sees.
-        49 SEEN: array uvec2;
+        SEEN: array uvec2;
         /// These bits again.
-        50 SEEN_TEXELS: texels Rg32Uint;
+        SEEN_TEXELS: texels Rg32Uint;
     }
 
     /// Set 2: the wave in flight, rewritten by every pass.
     WAVE = wave: 2 {
         /// Next ray of each path.
-        0 RAYS: array Ray;
+        RAYS: array Ray;
         /// Hit of each path.
-        1 HITS: array Hit;
+        HITS: array Hit;
         /// Shadow rays: direction `k` of path `i` at `k · path_count + i`.
-        2 SHADOW_RAYS: array ShadowRay;
+        SHADOW_RAYS: array ShadowRay;
         /// One where a shadow ray reaches the light, else zero.
-        3 VISIBILITY: array uint;
+        VISIBILITY: array uint;
         /// State of each path.
-        4 PATHS: array PathState;
+        PATHS: array PathState;
         /// Rays again, two texels each.
-        5 RAY_TEXELS: texels Rgba32Uint;
+        RAY_TEXELS: texels Rgba32Uint;
         /// Hits again, three texels each.
-        6 HIT_TEXELS: texels Rgba32Uint;
+        HIT_TEXELS: texels Rgba32Uint;
         /// Shadow rays again, three texels each.
-        7 SHADOW_RAY_TEXELS: texels Rg32Uint;
+        SHADOW_RAY_TEXELS: texels Rg32Uint;
         /// Surface at the hit of each path, in scenes with textures.
-        8 HIT_SURFACES: array Surface;
+        HIT_SURFACES: array Surface;
         /// Instance that each path has hit, in scenes with instances.
-        9 HIT_INSTANCES: array uint;
+        HIT_INSTANCES: array uint;
         /// Lengths of `PATH_LISTS` lists of paths, then the lists themselves: even and odd ones share a
         /// place each.
-        10 PATH_LISTS: array uint;
+        PATH_LISTS: array uint;
         /// Lists of paths again.
-        11 PATH_LIST_TEXELS: texels R32Uint;
+        PATH_LIST_TEXELS: texels R32Uint;
         /// First entry of the list that lamps were drawn from at the last vertex of each path.
-        12 LAMP_LISTS: array uint;
+        LAMP_LISTS: array uint;
         /// Layers of surfaces of each path, where they are asked for.
-        13 FEATURES: array Feature;
+        FEATURES: array Feature;
         /// Radiance of each path by groups of lights, where they are asked for: that of group `g` of path `i`
         /// at `g · path_count + i`.
-        14 GROUP_RADIANCE: array vec3;
+        GROUP_RADIANCE: array vec3;
         /// Group of the lamp of each path's last shadow ray to one, where groups are asked for.
-        15 LAMP_GROUPS: array uint;
+        LAMP_GROUPS: array uint;
     }
 
     /// Set 1 of the passes that show films in a window.
     VIEW = view: 1 {
         /// The controls: as the inset, with opacity, by which the colours are multiplied.
-        59 OVERLAY: array uint;
+        OVERLAY: array uint;
         /// Pixels of a film as they are shown: linear radiance, or the colours of a layer.
-        60 SHOWN: array vec3;
+        SHOWN: array vec3;
         /// The same of the film to its right, if there are two.
-        61 SHOWN_RIGHT: array vec3;
+        SHOWN_RIGHT: array vec3;
         /// A picture over the window, a word of bytes a pixel, red lowest.
-        62 INSET: array uint;
+        INSET: array uint;
         /// Pixels of the window in its own order of bytes.
-        63 WINDOW_PIXELS: array uint;
+        WINDOW_PIXELS: array uint;
     }
 
     /// Set 3: the film, which grows by every wave.
     FILM = film: 3 {
         /// Leading part of the sum of radiance.
-        0 FILM_SUM: array vec3;
+        FILM_SUM: array vec3;
         /// Rest of that sum.
-        1 FILM_COMPENSATION: array vec3;
+        FILM_COMPENSATION: array vec3;
         /// Leading part of the sum of squared radiance.
-        2 FILM_SQUARES: array vec3;
+        FILM_SQUARES: array vec3;
         /// Totals over all pixels.
-        3 COUNTERS: one Counters;
+        COUNTERS: one Counters;
         /// Sum of the albedo of surfaces, as in `Feature`.
-        4 FILM_ALBEDO: array vec3;
+        FILM_ALBEDO: array vec3;
         /// Sum of the shading normal of surfaces, as in `Feature`.
-        5 FILM_NORMAL: array vec3;
+        FILM_NORMAL: array vec3;
         /// Sum of the position of first hits.
-        6 FILM_POSITION: array vec3;
+        FILM_POSITION: array vec3;
         /// Visible and traced shadow rays.
-        7 FILM_VISIBLE: array uvec2;
+        FILM_VISIBLE: array uvec2;
         /// Entries of visibility caches, and hits that have one.
-        8 FILM_CACHE_ENTRIES: array uvec2;
+        FILM_CACHE_ENTRIES: array uvec2;
         /// Sum of the colours of the guide's cells at first hits.
-        9 FILM_GUIDE_CELL: array vec3;
+        FILM_GUIDE_CELL: array vec3;
         /// First hits by the kind of their cell: of a face, coarse, fine.
-        10 FILM_GUIDE_LEVEL: array vec3;
+        FILM_GUIDE_LEVEL: array vec3;
         /// Rest of the sum of squared radiance.
-        11 FILM_SQUARES_COMPENSATION: array vec3;
+        FILM_SQUARES_COMPENSATION: array vec3;
         /// Radiance of the samples of one sweep, pixel by pixel, between one row of the page before and one
         /// of the page after; that of the groups of lights follows each.
-        12 FILM_RADIANCE: array vec3;
+        FILM_RADIANCE: array vec3;
         /// Sum of the radiance of the pixel's own samples.
-        13 FILM_UNFILTERED: array vec3;
+        FILM_UNFILTERED: array vec3;
         /// Identifiers of objects and their numbers of samples: `MATTE_SLOTS` a pixel.
-        14 FILM_OBJECTS: array uvec2;
+        FILM_OBJECTS: array uvec2;
         /// The same of materials.
-        15 FILM_MATERIALS: array uvec2;
+        FILM_MATERIALS: array uvec2;
         /// Sum of the radiance of each group of lights, and its rest.
-        16 FILM_GROUPS: array vec3;
+        FILM_GROUPS: array vec3;
     }
 
     /// Set 3 of the probe kernels in `glsl/test`, which declare their own element types.
     PROBE = probe: 3 {
         /// Queries of a test.
-        32 PROBE_INPUT: array uint;
+        PROBE_INPUT: array uint;
         /// Answers of the kernel.
-        33 PROBE_OUTPUT: array uint;
+        PROBE_OUTPUT: array uint;
     }
 }

@@ -79,16 +79,8 @@ pub const fn specialization(name: &str) -> u32 {
 
 /// Returns the number of a room's buffer in its set.
 pub const fn buffer_number(name: &str) -> u32 {
-    let mut first = 0;
-    let (mut table, tables) = (0, bindings::TABLES);
-    while table < tables.len() {
-        let last = tables[table].bindings[tables[table].bindings.len() - 1].number;
-        if tables[table].set == SET && last >= first {
-            first = last + 1;
-        }
-        table += 1;
-    }
-    first + constants::place(BUFFER_NAMES, name)
+    let last = bindings::TABLES[bindings::TABLES.len() - 1].bindings;
+    last[last.len() - 1].number + 1 + constants::place(BUFFER_NAMES, name)
 }
 
 /// Returns every table of buffers.
