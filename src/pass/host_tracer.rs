@@ -186,20 +186,16 @@ struct Chance {
 
 impl Closest<'_> {
     fn answer(&self, paths: impl Iterator<Item = u32>) {
-        let mut packet = Packet::new();
-        let mut chances = Vec::new();
-        for path in paths {
+        let segments = paths.filter_map(|path| {
             let Ray { origin, direction, is_active, .. } = read(self.from, path);
-            if is_active == 0 || !is_finite(origin, direction) {
+            let is_followed = is_active != 0 && is_finite(origin, direction);
+            if !is_followed {
                 self.write(path, NO_TRIANGLE, NO_INSTANCE);
-                continue;
             }
-            packet.push(path, origin, direction, FAR_AWAY);
-            if packet.is_full() {
-                self.follow(&mut packet, &mut chances);
-            }
-        }
-        self.follow(&mut packet, &mut chances);
+            is_followed.then_some((path, (origin, direction, FAR_AWAY)))
+        });
+        let mut chances = Vec::new();
+        in_packets(segments, |packet| self.follow(packet, &mut chances));
     }
 
     fn follow(&self, packet: &mut Packet, chances: &mut Vec<Chance>) {
@@ -231,15 +227,8 @@ impl Closest<'_> {
                 chance.lane == lane && (is_passed || !chance.goes_on && chance.surface == surface)
             };
             let weight: Vec3 = chances.iter().filter(counts).map(|chance| chance.weight).product();
-            scale(
-                self.paths,
-                path,
-                offset_of!(PathState, throughput),
-                weight,
-                words_of::<PathState>(),
-            );
+            scale::<PathState>(self.paths, path, offset_of!(PathState, throughput), weight);
         }
-        packet.clear();
     }
 
     fn write(&self, path: u32, triangle: u32, instance: u32) {
@@ -265,27 +254,22 @@ impl Visible<'_> {
     fn answer(&self, paths: impl Iterator<Item = u32>) {
         let wave = self.wave;
         let all_paths = wave.pixel_count * wave.sample_count;
-        let mut packet = Packet::new();
-        for path in paths {
+        let segments = paths.flat_map(|path| {
             let hit: Hit = read(self.hits, path);
-            for direction in 0..wave.shadow_ray_count {
+            (0..wave.shadow_ray_count).filter_map(move |direction| {
                 let ray = direction * all_paths + path;
-                let ray_of_path = read(self.shadow_rays, ray);
-                let Some((origin, direction, farthest)) = self.segment(&hit, ray_of_path) else {
+                let segment = self.segment(&hit, read(self.shadow_rays, ray));
+                if segment.is_none() {
                     self.visibility[ray as usize].store(0, Ordering::Relaxed);
-                    continue;
-                };
-                packet.push(ray, origin, direction, farthest);
-                if packet.is_full() {
-                    self.follow(&mut packet);
                 }
-            }
-        }
-        self.follow(&mut packet);
+                Some((ray, segment?))
+            })
+        });
+        in_packets(segments, |packet| self.follow(packet));
     }
 
-    /// Origin, direction and length of a shadow ray from `hit`, unless it needs no tracing.
-    fn segment(&self, hit: &Hit, ray: ShadowRay) -> Option<([f32; 3], [f32; 3], f32)> {
+    /// The shadow ray from `hit`, unless it needs no tracing.
+    fn segment(&self, hit: &Hit, ray: ShadowRay) -> Option<Segment> {
         if hit.material == NO_MATERIAL || ray.contribution == [0.0; 3] {
             return None;
         }
@@ -316,11 +300,26 @@ impl Visible<'_> {
             self.visibility[ray as usize].store(is_visible.into(), Ordering::Relaxed);
             if is_visible {
                 let offset = offset_of!(ShadowRay, contribution);
-                scale(self.shadow_rays, ray, offset, passed[lane], words_of::<ShadowRay>());
+                scale::<ShadowRay>(self.shadow_rays, ray, offset, passed[lane]);
             }
         }
-        packet.clear();
     }
+}
+
+/// Origin, direction and length of a ray.
+type Segment = ([f32; 3], [f32; 3], f32);
+
+/// Calls `follow` with the rays in packets, each with the place of its answer.
+fn in_packets(segments: impl Iterator<Item = (u32, Segment)>, mut follow: impl FnMut(&mut Packet)) {
+    let mut packet = Packet::new();
+    for (place, (origin, direction, farthest)) in segments {
+        packet.push(place, origin, direction, farthest);
+        if packet.is_full() {
+            follow(&mut packet);
+            packet.clear();
+        }
+    }
+    follow(&mut packet);
 }
 
 /// The library expects numbers.
@@ -343,12 +342,12 @@ fn read<T: Pod>(words: &[AtomicU32], index: u32) -> T {
     bytemuck::pod_read_unaligned(bytemuck::cast_slice(element))
 }
 
-/// Multiplies three numbers, at `offset` bytes of an element of `stride` words, by `factor`.
-fn scale(words: &[AtomicU32], index: u32, offset: usize, factor: Vec3, stride: usize) {
+/// Multiplies three numbers, at `offset` bytes of element `index` of a buffer of `T`, by `factor`.
+fn scale<T>(words: &[AtomicU32], index: u32, offset: usize, factor: Vec3) {
     if factor == Vec3::ONE {
         return;
     }
-    let first = index as usize * stride + offset / size_of::<u32>();
+    let first = index as usize * words_of::<T>() + offset / size_of::<u32>();
     for (word, factor) in words[first..].iter().zip(factor.to_array()) {
         let value = f32::from_bits(word.load(Ordering::Relaxed)) * factor;
         word.store(value.to_bits(), Ordering::Relaxed);
