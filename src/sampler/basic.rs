@@ -10,25 +10,17 @@ use crate::{
     error::Result,
     pass::{Surfaces, Technique},
     shader::constants::{
-        CONSTANT_CANDIDATES, CONSTANT_COMPENSATION, CONSTANT_SAMPLER, SAMPLER_BRDF, SAMPLER_COSINE,
-        SAMPLER_ENV, SAMPLER_MIS, SAMPLER_RIS, SAMPLER_UNIFORM,
+        CONSTANT_CANDIDATES, CONSTANT_COMPENSATION, CONSTANT_SAMPLER, SAMPLER_MIS, SAMPLER_RIS,
     },
 };
 
 /// A sampler of `sample.comp`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Basic {
-    tag: u32,
+    /// `SAMPLER_…`.
+    pub(super) tag: u32,
 }
 
-/// Uniform over the hemisphere.
-pub const UNIFORM: Basic = Basic { tag: SAMPLER_UNIFORM };
-/// Proportional to the cosine.
-pub const COSINE: Basic = Basic { tag: SAMPLER_COSINE };
-/// The BRDF's own sampling.
-pub const BRDF: Basic = Basic { tag: SAMPLER_BRDF };
-/// Proportional to the luminance of the environment map.
-pub const ENV: Basic = Basic { tag: SAMPLER_ENV };
 /// `brdf` and `env` in turns with the one-sample balance heuristic.
 pub const MIS: Basic = Basic { tag: SAMPLER_MIS };
 /// Resampling over candidates of `mis`.

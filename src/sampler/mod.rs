@@ -27,7 +27,7 @@ use crate::{
     film::Aov,
     pass::{PathDemand, Runner, Technique},
     scene::Scene,
-    shader::rooms::registry,
+    shader::{constants, rooms::registry},
 };
 
 /// Input for creating a technique.
@@ -131,7 +131,7 @@ macro_rules! samplers {
             /// The code of the sampler.
             pub fn room(self) -> &'static dyn Room {
                 match self {
-                    $(Self::$basic => &basic::$tag,)*
+                    $(Self::$basic => &basic::Basic { tag: constants::$tag },)*
                     $(Self::$sampler => &$room::$entry,)*
                 }
             }

@@ -6,25 +6,25 @@
 //! [`Parameters`]: crate::sampler::Parameters
 
 /// Calls the macro `$then` with every sampler, simplest first. A line has the name in Rust and on the command
-/// line, the key in the window and the entry point; one of a room, which has parameters and a file
+/// line, the key in the window and the tag in `sample.comp`; one of a room, which has parameters and a file
 /// `shader.rs`, room, entry point and parameters.
 macro_rules! registry {
     ($then:ident) => {
         $then! {
             basic {
                 /// Uniform over the hemisphere.
-                Uniform "uniform" "1" = UNIFORM;
+                Uniform "uniform" "1" = SAMPLER_UNIFORM;
                 /// Proportional to the cosine.
-                Cosine "cosine" "2" = COSINE;
+                Cosine "cosine" "2" = SAMPLER_COSINE;
                 /// The BRDF's own sampling.
-                Brdf "brdf" "3" = BRDF;
+                Brdf "brdf" "3" = SAMPLER_BRDF;
                 /// Proportional to the luminance of the environment map.
-                Env "env" "4" = ENV;
+                Env "env" "4" = SAMPLER_ENV;
                 /// `brdf` and `env` in turns with the one-sample balance heuristic (Veach & Guibas 1995).
-                Mis "mis" "5" = MIS;
+                Mis "mis" "5" = SAMPLER_MIS;
                 /// Resampled importance sampling over candidates of `mis` (Burke et al. 2005; Talbot et al.
                 /// 2005).
-                Ris "ris" "6" = RIS;
+                Ris "ris" "6" = SAMPLER_RIS;
             }
             rooms {
                 /// Lobes of the product of environment and BRDF (Tsai et al. 2008).
