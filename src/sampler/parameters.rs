@@ -186,15 +186,6 @@ mod tests {
     use crate::sampler::Sampler;
 
     #[test]
-    fn an_unknown_key_lists_the_known_ones() {
-        let error = Parameters::default().set("candidate=4").unwrap_err().to_string();
-        assert!(
-            error.contains("candidate:") && error.contains("known: bounce-candidates"),
-            "{error}"
-        );
-    }
-
-    #[test]
     fn help_explains_every_key() {
         let help = Parameters::help();
         for key in Parameters::keys() {
