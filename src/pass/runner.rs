@@ -24,7 +24,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    film::{Sums, Window},
+    film::Window,
     gpu::{Commands, DescriptorSet, Device, MOST_INVOCATIONS, PassTimes},
     scene::Camera,
     shader::structs::Wave,
@@ -35,6 +35,8 @@ use crate::{
 const SHORT_DISPATCH_MS: f64 = 50.0;
 const LONG_DISPATCH_MS: f64 = 100.0;
 
+/// Paths of the first wave, before any timing is known.
+const FIRST_PATHS: u32 = 1 << 14;
 /// Share of living paths, of all at later vertices, below which the passes there walk lists of them.
 const MOST_LIVING: f64 = 0.4;
 
@@ -98,7 +100,7 @@ impl Runner {
         Ok(Self {
             device: Arc::clone(device),
             scene,
-            wave_paths: waves.first_wave_paths(),
+            wave_paths: FIRST_PATHS.min(waves.capacity()),
             waves,
             sharing,
             film,
@@ -353,11 +355,6 @@ impl Runner {
         self.film.clear(&self.device)?;
         self.totals = Totals::default();
         Ok(())
-    }
-
-    /// Reads the film without its size and sample count. Fails if the device does.
-    pub(crate) fn sums(&self) -> Result<Sums> {
-        self.film.download()
     }
 
     /// The device.

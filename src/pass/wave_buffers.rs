@@ -19,8 +19,6 @@ use crate::{
 const SOFTWARE_PATHS: u32 = 1 << 17;
 /// Most paths in flight on a GPU.
 const GPU_PATHS: u32 = 1 << 21;
-/// Paths of the first wave, before any timing is known.
-const FIRST_PATHS: u32 = 1 << 14;
 
 /// Returns the most paths in flight on a device.
 pub(crate) fn most_paths(capabilities: &Capabilities) -> u32 {
@@ -122,10 +120,5 @@ impl WaveBuffers {
     /// Largest number of paths in a wave.
     pub fn capacity(&self) -> u32 {
         self.capacity
-    }
-
-    /// Number of paths in the first wave.
-    pub(crate) fn first_wave_paths(&self) -> u32 {
-        FIRST_PATHS.min(self.capacity)
     }
 }

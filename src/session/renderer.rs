@@ -287,7 +287,7 @@ impl Renderer {
 
     /// Reads the film. Fails if the device does.
     pub fn sums(&self) -> Result<Sums> {
-        let mut sums = self.runner.sums()?;
+        let mut sums = self.runner.film().download()?;
         if !self.ahead.is_none() {
             self.runner.film().download_radiance(&mut sums)?;
             sums.ahead = self.ahead;
