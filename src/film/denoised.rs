@@ -76,10 +76,8 @@ pub(crate) fn image_of(film: &Image, pixels: &[[f32; 3]], denoiser: String) -> I
     image
 }
 
-/// Refuses a denoised image where the samples of a film are meant.
-///
-/// # Errors
-/// [`Error::Format`] names the denoiser.
+/// Refuses a denoised image where the samples of a film are meant. Fails with [`Error::Format`], which names
+/// the denoiser.
 pub(crate) fn check_film(image: &Image, path: &Path) -> Result<()> {
     let name = match image.attributes.get(DENOISED) {
         None => return Ok(()),

@@ -10,10 +10,7 @@ use crate::{error::Result, files::write_atomically};
 /// Quality of JPEG files, 1…100: no blocks are seen, at a tenth of the size of PNG.
 const JPEG_QUALITY: u8 = 92;
 
-/// Writes display values as JPEG.
-///
-/// # Errors
-/// [`crate::Error::Io`] with the cause.
+/// Writes display values as JPEG. Fails with [`crate::Error::Io`] and the cause.
 pub(crate) fn write_jpeg(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<()> {
     write_atomically(path, |file| {
         image::codecs::jpeg::JpegEncoder::new_with_quality(file, JPEG_QUALITY)
@@ -23,10 +20,7 @@ pub(crate) fn write_jpeg(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]
 }
 
 /// Writes linear values as Radiance HDR, whose three channels share one exponent: values lose what is
-/// below 1/256 of the largest of their pixel.
-///
-/// # Errors
-/// [`crate::Error::Io`] with the cause.
+/// below 1/256 of the largest of their pixel. Fails with [`crate::Error::Io`] and the cause.
 pub(crate) fn write_hdr(path: &Path, picture: &RgbImage) -> Result<()> {
     let pixels: Vec<Rgb<f32>> = picture.pixels.iter().map(|pixel| Rgb(*pixel)).collect();
     write_atomically(path, |file| {

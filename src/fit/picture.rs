@@ -89,10 +89,8 @@ fn write(path: &Path, stack: &[Panels]) -> Result<()> {
     write_rgb8(path, width, rows.len() as u32, &rows.concat())
 }
 
-/// Writes the picture of a fitted map as PNG, in the frame of the map.
-///
-/// # Errors
-/// [`crate::Error::Io`] with the cause.
+/// Writes the picture of a fitted map as PNG, in the frame of the map. Fails with [`crate::Error::Io`] and
+/// the cause.
 pub(crate) fn write_environment(
     path: &Path,
     map: &EnvironmentMap,
@@ -122,10 +120,8 @@ pub(crate) fn write_environment(
     write(path, &[Panels { width, height, data, fit }])
 }
 
-/// Writes the picture of a fitted BRDF as PNG: up to six views from the normal to the horizon.
-///
-/// # Errors
-/// [`crate::Error::Io`] with the cause.
+/// Writes the picture of a fitted BRDF as PNG: up to six views from the normal to the horizon. Fails with
+/// [`crate::Error::Io`] and the cause.
 pub(crate) fn write_brdf(
     path: &Path,
     tables: &MaterialTables,

@@ -130,10 +130,7 @@ impl Buffer {
     }
 
     /// Returns the words of a buffer whose memory the host shares with the device, as software devices do.
-    /// The device must not be at work on it.
-    ///
-    /// # Errors
-    /// The host does not see the memory.
+    /// The device must not be at work on it. Fails if the host does not see the memory.
     pub(crate) fn words(&self) -> Result<&[AtomicU32]> {
         let start = self.0.allocation.as_ref().and_then(Allocation::mapped_ptr);
         let start = start.ok_or_else(|| self.unmapped())?.cast::<AtomicU32>();

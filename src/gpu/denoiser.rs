@@ -82,10 +82,8 @@ pub(crate) struct Denoiser {
 }
 
 impl Denoiser {
-    /// Loads the library and opens its device.
-    ///
-    /// # Errors
-    /// [`Error::Denoiser`] if there is no library, if it lacks a function, or if it refuses the device.
+    /// Loads the library and opens its device. Fails with [`Error::Denoiser`] if there is no library, if it
+    /// lacks a function, or if it refuses the device.
     pub(crate) fn load() -> Result<Self> {
         let (library, path) = open_library()?;
         let new_device: unsafe extern "C" fn(c_int) -> Handle =
@@ -130,10 +128,8 @@ impl Denoiser {
         &self.version
     }
 
-    /// Filters a picture.
-    ///
-    /// # Errors
-    /// [`Error::Denoiser`] for layers of another size than the picture, and with the library's message.
+    /// Filters a picture. Fails with [`Error::Denoiser`] for layers of another size than the picture, and
+    /// with the library's message.
     pub(crate) fn denoise(&self, noisy: &Noisy<'_>) -> Result<Vec<[f32; 3]>> {
         let [width, height] = [noisy.width as usize, noisy.height as usize];
         let guides = [("albedo", noisy.albedo), ("normal", noisy.normal)];

@@ -92,9 +92,6 @@ impl DescriptorSet {
     }
 
     /// As [`DescriptorSet::new`], with `spare` for the buffers that are not named.
-    ///
-    /// # Errors
-    /// As [`DescriptorSet::new`].
     pub(crate) fn filled(
         device: &Arc<Device>,
         table: &'static BindingTable,

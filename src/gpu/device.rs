@@ -72,10 +72,8 @@ impl Device {
     }
 
     /// As [`Device::open_traced`], once `check` has let the device pass: drivers may crash as soon as it is
-    /// made. For windows on `display` too, if there is one.
-    ///
-    /// # Errors
-    /// Also those of `check`, and [`Error::Device`] if the device cannot show pictures in windows.
+    /// made. For windows on `display` too, if there is one. Fails also as `check` does, and with
+    /// [`Error::Device`] if the device cannot show pictures in windows.
     pub(crate) fn open_checked(
         wanted: Option<&str>,
         validate: bool,
@@ -253,10 +251,8 @@ impl Drop for Device {
     }
 }
 
-/// Loads the library by which the host traces, where it is to.
-///
-/// # Errors
-/// [`Error::Device`] if the host was asked for and cannot.
+/// Loads the library by which the host traces, where it is to. Fails with [`Error::Device`] if the host was
+/// asked for and cannot.
 pub(crate) fn embree_for(
     capabilities: &Capabilities,
     tracer: Tracer,

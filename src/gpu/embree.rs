@@ -95,10 +95,8 @@ unsafe impl Send for Embree {}
 unsafe impl Sync for Embree {}
 
 impl Embree {
-    /// Loads the library and opens its device.
-    ///
-    /// # Errors
-    /// [`Error::Device`] if there is no library, if it is of another version, or if it refuses the CPU.
+    /// Loads the library and opens its device. Fails with [`Error::Device`] if there is no library, if it is
+    /// of another version, or if it refuses the CPU.
     pub(crate) fn load() -> Result<Arc<Self>> {
         let (library, path) = library::open(LIBRARY_VARIABLE, &NAMES, None).map_err(|found| {
             missing(format!("the library Embree ({}), which cannot be loaded: {found}", NAMES[1]))

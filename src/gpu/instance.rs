@@ -40,10 +40,8 @@ struct DebugMessenger {
 
 impl Instance {
     /// Loads Vulkan and creates an instance. `validate` enables the Khronos validation layer,
-    /// including synchronization validation; `display` asks for the extensions that show windows there.
-    ///
-    /// # Errors
-    /// [`Error::Device`] if the Vulkan loader, the requested layer or such an extension is missing,
+    /// including synchronization validation; `display` asks for the extensions that show windows there. Fails
+    /// with [`Error::Device`] if the Vulkan loader, the requested layer or such an extension is missing, with
     /// [`Error::Memory`] if the address space does not suffice for a driver.
     pub(crate) fn new(validate: bool, display: Option<RawDisplayHandle>) -> Result<Self> {
         memory::check_driver().map_err(Error::memory)?;

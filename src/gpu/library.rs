@@ -9,10 +9,7 @@ use libloading::Library;
 
 /// Opens the first library that loads: of those with one of `names` in the folder that the environment
 /// variable `variable` names, or the file that it names; without the variable, the system's, then those in
-/// the folder `own`.
-///
-/// # Errors
-/// The reason for the first failure.
+/// the folder `own`. Fails with the reason for the first failure.
 pub(super) fn open(
     variable: &str,
     names: &[&str],

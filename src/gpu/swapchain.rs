@@ -53,10 +53,8 @@ pub(crate) struct Swapchain {
 
 impl Swapchain {
     /// Makes images of `size` pixels for a window, on a device opened for its display. A size of zero
-    /// shows nothing until [`Swapchain::resize`].
-    ///
-    /// # Errors
-    /// [`Error::Device`] if the device cannot show pictures there, [`Error::Vulkan`] if a call fails.
+    /// shows nothing until [`Swapchain::resize`]. Fails with [`Error::Device`] if the device cannot show
+    /// pictures there, with [`Error::Vulkan`] if a call fails.
     pub(crate) fn new(
         device: &Arc<Device>,
         window: Arc<dyn Target>,
@@ -86,10 +84,8 @@ impl Swapchain {
         Ok(swapchain)
     }
 
-    /// Makes a surface of the window, in place of one that was lost, and its images.
-    ///
-    /// # Errors
-    /// As [`Swapchain::new`].
+    /// Makes a surface of the window, in place of one that was lost, and its images. Fails as
+    /// [`Swapchain::new`].
     pub(crate) fn renew(&mut self, size: [u32; 2]) -> Result<()> {
         let no_handle = |error| Error::Device {
             reason: format!("the window has no handle for Vulkan: {error}"),
@@ -123,10 +119,8 @@ impl Swapchain {
         }
     }
 
-    /// Makes images of another size; the display may insist on its own, see [`Swapchain::size`].
-    ///
-    /// # Errors
-    /// As [`Swapchain::new`].
+    /// Makes images of another size; the display may insist on its own, see [`Swapchain::size`]. Fails as
+    /// [`Swapchain::new`].
     pub(crate) fn resize(&mut self, [width, height]: [u32; 2]) -> Result<()> {
         let physical = self.device.physical;
         // SAFETY: device and surface belong together.

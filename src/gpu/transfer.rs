@@ -22,10 +22,8 @@ const WORDS_TOGETHER: usize = 1 << 14;
 
 impl Buffer {
     /// Creates a buffer that holds `data`, or one element of zeros, and is read only as a uniform texel
-    /// buffer: no limit on storage buffers applies. The descriptor set checks the number of texels.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if memory runs out.
+    /// buffer: no limit on storage buffers applies. The descriptor set checks the number of texels. Fails
+    /// with [`crate::Error::Vulkan`] if memory runs out.
     pub(crate) fn texels_from_slice<T: Pod>(
         device: &Arc<Device>,
         name: &str,

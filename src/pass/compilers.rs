@@ -87,10 +87,8 @@ impl Drop for Compilers {
     }
 }
 
-/// Compiles kernels, of which `list` is what [`Compilers`] wrote, in a process of its own.
-///
-/// # Errors
-/// [`Error::Usage`] if there is no such kernel; those of the device.
+/// Compiles kernels, of which `list` is what [`Compilers`] wrote, in a process of its own. Fails with
+/// [`Error::Usage`] if there is no such kernel, and as the device does.
 pub(crate) fn compile(device: &Arc<Device>, list: &str) -> Result<()> {
     let list: Vec<(String, Vec<(u32, u32)>)> =
         serde_json::from_str(list).map_err(|error| Error::usage(error.to_string()))?;

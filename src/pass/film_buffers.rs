@@ -79,10 +79,8 @@ pub(crate) fn aov_bits(aovs: &[Aov]) -> u32 {
 }
 
 /// Checks that there is memory for a film with the layers in the bits `aovs` and of groups of lights, on a
-/// software device too, and for the sums that are read back and the image that is made of them.
-///
-/// # Errors
-/// [`Error::Memory`].
+/// software device too, and for the sums that are read back and the image that is made of them. Fails with
+/// [`Error::Memory`] if there is not.
 pub(crate) fn check_memory(
     device: &Device,
     window: Window,

@@ -31,10 +31,7 @@ fn triangles_of(accel: &Accel, mesh: u32) -> Range<u32> {
     accel.first_triangles[mesh as usize]..accel.first_triangles[mesh as usize + 1]
 }
 
-/// Checks that the host may place the instances unasked.
-///
-/// # Errors
-/// There are too many triangles.
+/// Checks that the host may place the instances unasked. Fails if there are too many triangles.
 pub(super) fn check_copies(accel: &Accel) -> Result<()> {
     let copies = copies(accel);
     if copies <= MOST_COPIES {
@@ -50,10 +47,7 @@ pub(super) fn check_copies(accel: &Accel) -> Result<()> {
 }
 
 /// Returns the triangles of `accel`, which lie in `pages`; `may_pass` says of a material whether light may
-/// pass its surfaces.
-///
-/// # Errors
-/// Memory does not suffice.
+/// pass its surfaces. Fails if memory does not suffice.
 pub(super) fn parts(
     accel: &Accel,
     pages: &[Buffer],

@@ -67,10 +67,7 @@ pub struct Answers {
 }
 
 impl Answers {
-    /// True if any path that a pass walks has a ray to follow.
-    ///
-    /// # Errors
-    /// As [`HostTracer::answer`].
+    /// True if any path that a pass walks has a ray to follow. Fails as [`HostTracer::answer`].
     pub(super) fn has_rays(&self, wave: &Wave) -> Result<bool> {
         let ListedPaths { count, list } = ListedPaths::new(wave, &self.path_lists)?;
         let rays = self.rays.words()?;
@@ -88,10 +85,8 @@ impl Answers {
 impl HostTracer {
     /// Builds the tree over `accel`, whose triangles lie in `pages`; `passages` says what light passes, if it
     /// passes any. Instances are placed: as instances of the library, in the space of their meshes, those
-    /// that share edges would leak. Too many are refused unless the host `must_trace`.
-    ///
-    /// # Errors
-    /// Memory does not suffice, or the library fails.
+    /// that share edges would leak. Too many are refused unless the host `must_trace`. Fails if memory does
+    /// not suffice, or the library fails.
     pub(super) fn new(
         embree: &Arc<Embree>,
         accel: &Accel,
@@ -114,10 +109,8 @@ impl HostTracer {
     }
 
     /// Answers what a pass asks about the rays of a wave. Returns the number of paths that it walked.
-    /// `parameters` holds [`crate::shader::structs::SceneParameters`].
-    ///
-    /// # Errors
-    /// The host does not share the memory of a buffer.
+    /// `parameters` holds [`crate::shader::structs::SceneParameters`]. Fails if the host does not share the
+    /// memory of a buffer.
     pub(super) fn answer(
         &self,
         question: Question,

@@ -93,10 +93,7 @@ impl Passages {
         self.surfaces.passes[material as usize]
     }
 
-    /// Looks into the buffers.
-    ///
-    /// # Errors
-    /// The host does not share the memory of a buffer.
+    /// Looks into the buffers. Fails if the host does not share the memory of a buffer.
     pub(super) fn open(&self) -> Result<OpenPassages<'_>> {
         let of = &self.surfaces;
         let access = of.access;

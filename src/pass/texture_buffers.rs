@@ -43,11 +43,8 @@ pub(crate) struct TextureBuffers {
 }
 
 impl TextureBuffers {
-    /// Copies everything to the device.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] with sizes if four pages do not hold the texels or the attributes, and those of
-    /// [`Buffer`].
+    /// Copies everything to the device. Fails with [`Error::Usage`] and sizes if four pages do not hold the
+    /// texels or the attributes, and as [`Buffer`]s do.
     pub(crate) fn new(
         device: &Arc<Device>,
         tables: &SurfaceTables,

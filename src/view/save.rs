@@ -46,10 +46,8 @@ pub(super) fn views(scene: &str) -> Vec<PathBuf> {
     (1..=MOST_VIEWS).map(of).filter(|file| file.exists()).collect()
 }
 
-/// Writes size and pixels of the window, the film to the left with its metadata, and the camera.
-///
-/// # Errors
-/// [`crate::Error::Io`] with the cause.
+/// Writes size and pixels of the window, the film to the left with its metadata, and the camera. Fails with
+/// [`crate::Error::Io`] and the cause.
 pub(super) fn write(
     [png, exr, toml]: &[PathBuf; 3],
     (size, pixels): ([u32; 2], &[[u8; 3]]),

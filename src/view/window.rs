@@ -79,19 +79,15 @@ enum Report {
 pub(crate) struct Display(EventLoop<Report>);
 
 impl Display {
-    /// Connects to the display of the environment. Once in a process, in its first thread.
-    ///
-    /// # Errors
+    /// Connects to the display of the environment. Once in a process, in its first thread. Fails with
     /// [`Error::Device`] if there is none.
     pub(crate) fn open() -> Result<Self> {
         let event_loop = EventLoop::with_user_event().build();
         event_loop.map(Self).map_err(|error| no_window(&error))
     }
 
-    /// Shows `scene` until its window is closed.
-    ///
-    /// # Errors
-    /// [`Error::Device`] without a device that can show pictures there; all that rendering can fail of.
+    /// Shows `scene` until its window is closed. Fails with [`Error::Device`] without a device that can show
+    /// pictures there, and as all that renders.
     pub(crate) fn run(self, scene: Scene, options: Options) -> Result<()> {
         let Self(event_loop) = self;
         let (sender, inputs) = channel();

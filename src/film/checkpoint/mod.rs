@@ -282,10 +282,8 @@ fn slot_names(layer: &str, slot: usize) -> [String; 4] {
         .map(|part| format!("{layer}{slot}.{part}"))
 }
 
-/// Inverse of [`insert_counts`]; empty if a channel is missing.
-///
-/// # Errors
-/// [`Error::Format`] for a pair that is not a count of 32 bits.
+/// Inverse of [`insert_counts`]; empty if a channel is missing. Fails with [`Error::Format`] for a pair that
+/// is not a count of 32 bits.
 fn counts(image: &Image, names: [&str; 4], path: &Path) -> Result<Vec<[u32; 2]>> {
     let [Some(first), Some(first_rest), Some(second), Some(second_rest)] =
         names.map(|name| image.channels.get(name))

@@ -133,10 +133,8 @@ pub(crate) struct Encoded {
 
 impl Encoded {
     /// Writes the checkpoint and the file of its guide. Both replace older ones at one moment: at
-    /// every other, and after every failure, the older pair or the newer one is complete.
-    ///
-    /// # Errors
-    /// [`Error::Io`] with the cause.
+    /// every other, and after every failure, the older pair or the newer one is complete. Fails with
+    /// [`Error::Io`] and the cause.
     pub(crate) fn write(&self, path: &Path) -> Result<()> {
         self.write_in_steps(path, &mut |_| Ok(()))
     }

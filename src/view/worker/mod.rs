@@ -165,10 +165,8 @@ impl Worker {
         })
     }
 
-    /// Renders until the window is closed.
-    ///
-    /// # Errors
-    /// A failing device, a lost display, a file that cannot be written.
+    /// Renders until the window is closed. Fails if the device does, if the display is lost, or if a file
+    /// cannot be written.
     pub(crate) fn run(&mut self) -> Result<()> {
         self.tell();
         // A small film shows the scene at once; the whole one takes seconds on a software device.
