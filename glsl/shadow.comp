@@ -1,11 +1,11 @@
 // Tests the visibility of the light along every shadow ray of the wave: shadow_rays, hits ->
 // visibility. Surfaces that are not opaque, and thin panes, dim the ray's contribution. Ray
 // direction_index · path_count + path_index starts at hit path_index: neighbouring invocations work
-// on neighbouring paths. As in trace.comp, one traversal loop takes several rays.
+// on neighbouring paths.
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
-#include "given_up.glsl"
+#include "follow.glsl"
 #include "passage.glsl"
 #include "load.glsl"
 #include "path_list.glsl"
@@ -14,10 +14,6 @@
 WRITES(visibility)
 UPDATES(shadow_rays)
 UPDATES(counters)
-
-// At most 32: results are kept as bits until the end.
-layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
-layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;
 
 // Starts a ray, or finishes one without a contribution. Returns true if it is traced.
 bool start_ray(uint place, uint path_count, float offset) {
@@ -44,46 +40,19 @@ void main() {
     float offset = ray_offset();
 
     uint visible_bits = 0u;
-    uint turn = 0u;
-    uint steps = 0u;
-    uint given_up = 0u;
-    bool has_ray = first < ray_count;
     bool is_traced = false;
-    if (has_ray) {
-        is_traced = start_ray(first, path_count, offset);
-    }
-    while (has_ray) {
-        bool running = true;
-        // One ballot per step: software devices loop over the lanes for each.
-        uint refill = min(REFILL_LANES, subgroupBallotBitCount(subgroupBallot(true)));
-        do {
-            if (running) {
-                running = bvh_step(true);
-            }
-            steps++;
-        } while (subgroupBallotBitCount(subgroupBallot(!running)) < refill
-            && steps < TRAVERSAL_STEP_LIMIT);
-        if (!running || steps >= TRAVERSAL_STEP_LIMIT) {
-            given_up |= running ? 1u << turn : 0u;
+    FOLLOW_RAYS(
+        first, ray_count, true,
+        is_traced = start_ray(first + turn * WORKGROUP_SIZE, path_count, offset),
+        {
             bool is_visible = is_traced && !running && bvh_triangle == NO_TRIANGLE;
             visible_bits |= is_visible ? 1u << turn : 0u;
             if (HAS_PASSAGES && is_visible && bvh_transmittance != vec3(1.0)) {
                 uint ray = listed_ray(first + turn * WORKGROUP_SIZE, path_count).ray;
                 shadow_rays[ray].contribution *= bvh_transmittance;
             }
-            turn++;
-            has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
-            if (has_ray) {
-                is_traced = start_ray(first + turn * WORKGROUP_SIZE, path_count, offset);
-            }
-        }
-    }
-
-    // A loop, since software devices run the body of every branch.
-    for (; given_up != 0u; given_up &= given_up - 1u) {
-        uint lost = uint(findLSB(given_up));
-        COUNT_GIVEN_UP(listed_ray(first + lost * WORKGROUP_SIZE, path_count).path);
-    }
+        },
+        listed_ray(first + lost * WORKGROUP_SIZE, path_count).path)
     uint traced = turn;
     for (turn = 0u; turn < traced; turn++) {
         uint ray = listed_ray(first + turn * WORKGROUP_SIZE, path_count).ray;

@@ -1,13 +1,12 @@
 // Finds the closest hit of every ray of the wave: rays -> hits.
 //
-// One traversal loop takes RAYS_PER_INVOCATION rays: once enough lanes of the subgroup have finished,
-// all of those take their next ray. Surfaces are evaluated afterwards, with all lanes in step.
+// Surfaces are evaluated afterwards, with all lanes in step.
 //
 // Where the host has answered (ANSWERED), hits and hit_instances hold what rays meet, and none is followed.
 #version 460
 #extension GL_KHR_shader_subgroup_ballot : require
 
-#include "given_up.glsl"
+#include "follow.glsl"
 #include "passage.glsl"
 #include "load.glsl"
 #include "path_list.glsl"
@@ -19,9 +18,6 @@ UPDATES(hit_instances)
 UPDATES(paths)
 UPDATES(counters)
 
-// At most 32: rays given up are kept as bits until the end.
-layout(constant_id = CONSTANT_RAYS_PER_INVOCATION) const uint RAYS_PER_INVOCATION = 1u;
-layout(constant_id = CONSTANT_REFILL_LANES) const uint REFILL_LANES = 0xffffffffu;
 layout(constant_id = CONSTANT_ANSWERED) const uint ANSWERED = 0u;
 
 // Tests whether light is sampled at a surface: not at a specular one, nor at the black back of a
@@ -68,50 +64,22 @@ void start_ray(uint path) {
     bvh_nodes_waiting.y = ray.is_active != 0u ? bvh_nodes_waiting.y : 0u;
 }
 
-// Follows the rays of an invocation, the first one of `ray_count` and each WORKGROUP_SIZE further on.
+// Notes what the rays of an invocation meet.
 void follow_rays(uint first, uint ray_count) {
-    uint turn = 0u;
-    uint steps = 0u;
-    uint given_up = 0u;
-    bool has_ray = first < ray_count;
-    if (has_ray) {
-        start_ray(listed_path(first + turn * WORKGROUP_SIZE));
-    }
-    while (has_ray) {
-        bool running = true;
-        // One ballot per step: software devices loop over the lanes for each.
-        uint refill = min(REFILL_LANES, subgroupBallotBitCount(subgroupBallot(true)));
-        do {
-            if (running) {
-                running = bvh_step(false);
-            }
-            steps++;
-        } while (subgroupBallotBitCount(subgroupBallot(!running)) < refill
-            && steps < TRAVERSAL_STEP_LIMIT);
-        if (!running || steps >= TRAVERSAL_STEP_LIMIT) {
-            given_up |= running ? 1u << turn : 0u;
+    // Not in an array of the lane: drivers repeat the evaluation of a surface for each element.
+    FOLLOW_RAYS(
+        first, ray_count, false, start_ray(listed_path(first + turn * WORKGROUP_SIZE)),
+        {
             uint path = listed_path(first + turn * WORKGROUP_SIZE);
             if (HAS_PASSAGES && !running && bvh_triangle != NO_TRIANGLE && goes_through(path)) {
                 continue;
             }
-            // Not in an array of the lane: drivers repeat the evaluation of a surface for each element.
             hits[path].triangle = bvh_triangle;
             if (HAS_INSTANCES) {
                 hit_instances[path] = bvh_hit_instance;
             }
-            turn++;
-            has_ray = turn < RAYS_PER_INVOCATION && first + turn * WORKGROUP_SIZE < ray_count;
-            if (has_ray) {
-                start_ray(listed_path(first + turn * WORKGROUP_SIZE));
-            }
-        }
-    }
-
-    // A loop, since software devices run the body of every branch.
-    for (; given_up != 0u; given_up &= given_up - 1u) {
-        uint lost = uint(findLSB(given_up));
-        COUNT_GIVEN_UP(listed_path(first + lost * WORKGROUP_SIZE));
-    }
+        },
+        listed_path(first + lost * WORKGROUP_SIZE))
 }
 
 void main() {

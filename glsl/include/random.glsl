@@ -90,10 +90,7 @@ vec2 random_2d(uint pixel, uint sample_index, uint dimension, uint seed) {
 
 // First coordinate of random_2d.
 float random_1d(uint pixel, uint sample_index, uint dimension, uint seed) {
-    uvec4 keys = random_keys(pixel, dimension, seed);
-    uint shuffled =
-        bitfieldReverse(laine_karras_permutation(bitfieldReverse(sample_index), keys.x));
-    return unit_float(bitfieldReverse(laine_karras_permutation(shuffled, keys.y)));
+    return random_2d(pixel, sample_index, dimension, seed).x;
 }
 
 // Numbers unrelated between samples, pixels and dimensions.
@@ -104,5 +101,5 @@ vec2 random_independent_2d(uint pixel, uint sample_index, uint dimension, uint s
 
 // First coordinate of random_independent_2d.
 float random_independent_1d(uint pixel, uint sample_index, uint dimension, uint seed) {
-    return unit_float(hash_4d(uvec4(pixel, sample_index, dimension, seed)).x);
+    return random_independent_2d(pixel, sample_index, dimension, seed).x;
 }
