@@ -30,7 +30,7 @@ pub struct Record {
     pub world_from_object: [[f32; 4]; 3],
     /// Root of the tree of the mesh.
     pub first_node: u32,
-    /// Materials are `first_material + (own & material_mask)`.
+    /// First material, see [`Record::material`].
     pub first_material: u32,
     /// All bits, or none to replace all materials by the first.
     pub material_mask: u32,
@@ -152,6 +152,11 @@ impl Record {
     /// Takes a position of the mesh to the world.
     pub(crate) fn point_to_world(&self, position: Vec3) -> Vec3 {
         map_point(&self.world_from_object, position)
+    }
+
+    /// Material of a triangle that has `own` in its mesh.
+    pub(crate) fn material(&self, own: u32) -> u32 {
+        self.first_material + (own & self.material_mask)
     }
 
     /// Growth of node boxes for a ray that starts at `origin`.

@@ -64,7 +64,7 @@ pub(super) fn parts(
     for (instance, (record, mesh)) in (0..).zip(accel.instances.iter().zip(&accel.instance_meshes))
     {
         let triangles = triangles_of(accel, *mesh);
-        let may_pass = |own: u32| may_pass(record.first_material + (own & record.material_mask));
+        let may_pass = |own: u32| may_pass(record.material(own));
         if *mesh == PLACED {
             parts.extend(shared_parts(accel, pages, triangles, instance, &may_pass));
         } else {

@@ -27,7 +27,8 @@ use crate::{
     scene::Scene,
     shader::{
         constants::{
-            LAMP_BIT, LAMP_DIRECTIONAL, LAMP_POINT, LAMP_SPOT_LINEAR_ANGLE, LAMP_SPOT_SMOOTH_COSINE,
+            LAMP_BIT, LAMP_DIRECTIONAL, LAMP_POINT, LAMP_SPOT_LINEAR_ANGLE,
+            LAMP_SPOT_SMOOTH_COSINE, NO_INSTANCE,
         },
         structs::{Lamp, LampChoice, LampEntry},
     },
@@ -272,7 +273,7 @@ impl Survey<'_> {
         };
         let (mut origin, mut direction) = if let Some(triangle) = triangle {
             let position = self.point_on(triangle, [c, d.rotate_left(16)]);
-            let normal = sides * self.normal(triangle);
+            let normal = sides * self.normal(triangle, NO_INSTANCE);
             places.push(Place { position, normal });
             let direction = bounced(normal, hash_4d([walk, 0, 1, SEED]));
             (moved_off_surface(position, normal, direction, self.offset), direction)
@@ -289,7 +290,7 @@ impl Survey<'_> {
         for step in 1..=WALK_PLACES {
             let Some(hit) = self.stops(&mut origin, direction, f32::MAX) else { break };
             let position = origin + hit.distance * direction;
-            let normal = self.world_normal(&hit);
+            let normal = self.normal(hit.triangle, hit.instance);
             let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
             places.push(Place { position, normal });
             direction = bounced(normal, hash_4d([walk, step, 1, SEED]));
@@ -304,10 +305,8 @@ impl Survey<'_> {
         for _ in 0..MOST_PASSED {
             let hit = self.accel.closest_before(*origin, direction, farthest)?;
             let own = self.accel.triangle_materials[hit.triangle as usize];
-            let material =
-                self.accel.instances.get(hit.instance as usize).map_or(own, |instance| {
-                    instance.first_material + (own & instance.material_mask)
-                });
+            let instance = self.accel.instances.get(hit.instance as usize);
+            let material = instance.map_or(own, |instance| instance.material(own));
             if !self.passes[material as usize] {
                 return Some(hit);
             }
@@ -335,14 +334,10 @@ impl Survey<'_> {
         p + u * (q - p) + v * (r - p)
     }
 
-    fn normal(&self, triangle: u32) -> Vec3 {
-        let [a, b, c] = corners(self.accel, triangle);
-        (b - a).cross(c - a).normalize_or(Vec3::Y)
-    }
-
-    fn world_normal(&self, hit: &Intersection) -> Vec3 {
-        let instance = self.accel.instances.get(hit.instance as usize);
-        let corners = self.accel.triangle(hit.triangle).vertices;
+    /// Unit normal of a triangle in the world.
+    fn normal(&self, triangle: u32, instance: u32) -> Vec3 {
+        let instance = self.accel.instances.get(instance as usize);
+        let corners = self.accel.triangle(triangle).vertices;
         let [a, b, c] = corners.map(|vertex| placed(instance, vertex.position));
         (b - a).cross(c - a).normalize_or(Vec3::Y)
     }
@@ -356,7 +351,7 @@ impl Survey<'_> {
             let to_lamp = self.point_on(source, [c, d]) - position;
             let distance = to_lamp.length().max(1e-6);
             let direction = to_lamp / distance;
-            let cosine = -direction.dot(self.normal(source));
+            let cosine = -direction.dot(self.normal(source, NO_INSTANCE));
             let material = self.accel.triangle_materials[source as usize] as usize;
             let (sides, cosine) =
                 if self.two_sided[material] { (2.0, cosine.abs()) } else { (1.0, cosine.max(0.0)) };

@@ -164,7 +164,7 @@ impl OpenPassages<'_> {
         let weights = areas / (areas.x + areas.y + areas.z);
 
         let own = self.triangle_materials[met.triangle as usize].load(Ordering::Relaxed);
-        let index = instance.map_or(own, |of| of.first_material + (own & of.material_mask));
+        let index = instance.map_or(own, |of| of.material(own));
         let attributes = AttributeWords { bits: of.access.attributes, words: &self.attributes };
         let opacity = surface_opacity(
             &self.textures,

@@ -17,7 +17,7 @@ pub const BYTES_PER_CELL: u64 =
 pub struct ArrivalBuffers {
     arriving: Buffer,
     reflected: Buffer,
-    arrivals: Buffer,
+    pub(super) arrivals: Buffer,
 }
 
 impl ArrivalBuffers {
@@ -44,11 +44,6 @@ impl ArrivalBuffers {
     /// Reads the counts of the first `cells` cells.
     pub fn counted(&self, cells: usize) -> Result<Vec<ArrivalWords>> {
         self.arrivals.download(cells * ARRIVAL_DIRECTIONS)
-    }
-
-    /// Continues from the counts of an earlier render.
-    pub fn upload_counted(&self, counted: &[ArrivalWords]) -> Result<()> {
-        self.arrivals.upload(bytemuck::cast_slice(counted))
     }
 
     /// Records the clearing of the counts of the first `cells` cells.

@@ -2,6 +2,8 @@
 
 use std::{sync::Arc, time::Instant};
 
+use bytemuck::Pod;
+
 use super::{
     ARRIVAL_DIRECTIONS, ArrivalWords, CellKey, CountWords, Guide, GuideState, MAX_CELLS, Origin,
     SHARE_WORDS, Snapshot,
@@ -341,17 +343,11 @@ impl GuideBuffers {
         );
         self.learned = self.with_bounces(learned, &state.arrivals, forget);
         self.clear_counts()?;
-        let room = self.learned.cell_count() * self.partition.regions.len();
-        self.counts
-            .upload(bytemuck::cast_slice(&state.pending[..state.pending.len().min(room)]))?;
-        let room = self.learned.cell_count() * SHARE_WORDS;
-        let shares = &state.pending_shares[..state.pending_shares.len().min(room)];
-        self.shares.upload(bytemuck::cast_slice(shares))?;
-        if let Some(arrivals) = &self.arrivals {
-            let room = self.learned.cell_count() * ARRIVAL_DIRECTIONS;
-            arrivals.upload_counted(
-                &state.pending_arrivals[..state.pending_arrivals.len().min(room)],
-            )?;
+        let cells = self.learned.cell_count();
+        upload_start(&self.counts, &state.pending, cells * self.partition.regions.len())?;
+        upload_start(&self.shares, &state.pending_shares, cells * SHARE_WORDS)?;
+        if let Some(ArrivalBuffers { arrivals, .. }) = &self.arrivals {
+            upload_start(arrivals, &state.pending_arrivals, cells * ARRIVAL_DIRECTIONS)?;
         }
         let mut missing: Vec<u32> = state.missing.iter().map(|word| !word).collect();
         if missing.len() != self.missing_slots {
@@ -401,6 +397,11 @@ impl GuideBuffers {
         self.table.upload(bytemuck::cast_slice(table))?;
         self.entries.upload(bytemuck::cast_slice(entries))
     }
+}
+
+/// Uploads as many of the values as there is `room` for.
+fn upload_start<T: Pod>(buffer: &Buffer, values: &[T], room: usize) -> Result<()> {
+    buffer.upload(bytemuck::cast_slice(&values[..values.len().min(room)]))
 }
 
 /// Makes cells about [`CELL_PIXELS`] wide in the picture, at most a twentieth of the scene.
