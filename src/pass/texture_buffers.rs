@@ -54,14 +54,12 @@ impl TextureBuffers {
         tables.textures.check(shift)?;
         let limit = MAX_PAGES << shift;
         if attributes.words.len() > limit {
-            return Err(Error::Usage {
-                message: format!(
-                    "texture coordinates, tangents and colours of the triangles need {} MiB, but this \
-                     device's buffers hold {} MiB: use simpler meshes or another device (--device)",
-                    attributes.words.len().div_ceil(1 << 18),
-                    limit >> 18
-                ),
-            });
+            return Err(Error::usage(format!(
+                "texture coordinates, tangents and colours of the triangles need {} MiB, but this \
+                 device's buffers hold {} MiB: use simpler meshes or another device (--device)",
+                attributes.words.len().div_ceil(1 << 18),
+                limit >> 18
+            )));
         }
         let page_words = 1_u64 << shift;
         let texture_pages = (0..tables.textures.word_count().div_ceil(page_words).max(1))
