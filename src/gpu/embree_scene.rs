@@ -2,6 +2,7 @@
 
 use std::{
     ffi::{c_int, c_void},
+    ops::Range,
     ptr,
     sync::Arc,
 };
@@ -52,18 +53,21 @@ pub(crate) struct Part {
 }
 
 impl Part {
-    /// Takes `triangles` of the scene, whose positions are `vertices` from those of `first` on.
-    pub(crate) fn new(
-        vertices: Vertices,
+    /// Takes `triangles` of the scene, whose positions are `vertices` from those of `first` on: those that
+    /// stop all light, and those of which `may_pass` says that light may pass them.
+    pub(crate) fn pair(
+        vertices: &Vertices,
         first: u32,
         instance: u32,
-        is_passing: bool,
-        triangles: impl Iterator<Item = u32>,
-    ) -> Self {
-        let corners = triangles
-            .map(|triangle| [0, 1, 2].map(|corner| 3 * (triangle - first) + corner))
-            .collect();
-        Self { vertices, first, corners, instance, is_passing }
+        triangles: Range<u32>,
+        may_pass: impl Fn(u32) -> bool,
+    ) -> [Self; 2] {
+        [false, true].map(|is_passing| {
+            let own = triangles.clone().filter(|triangle| may_pass(*triangle) == is_passing);
+            let corners = |triangle: u32| [0, 1, 2].map(|corner| 3 * (triangle - first) + corner);
+            let (vertices, corners) = (vertices.clone(), own.map(corners).collect());
+            Self { vertices, first, corners, instance, is_passing }
+        })
     }
 
     fn triangle(&self, primitive: u32) -> u32 {

@@ -82,17 +82,12 @@ fn shared_parts(
     instance: u32,
     may_pass: &dyn Fn(u32) -> bool,
 ) -> Vec<Part> {
+    let may_pass = |triangle: u32| may_pass(accel.triangle_materials[triangle as usize]);
     let mut parts = Vec::new();
     for (number, page) in (0..).zip(pages) {
         let first = number << accel.page_shift;
-        let end = (first + (1 << accel.page_shift)).min(triangles.end);
-        for is_passing in [false, true] {
-            let triangles = (first.max(triangles.start)..end).filter(|&triangle| {
-                may_pass(accel.triangle_materials[triangle as usize]) == is_passing
-            });
-            let vertices = Vertices::Shared(page.clone());
-            parts.push(Part::new(vertices, first, instance, is_passing, triangles));
-        }
+        let own = first.max(triangles.start)..(first + (1 << accel.page_shift)).min(triangles.end);
+        parts.extend(Part::pair(&Vertices::Shared(page.clone()), first, instance, own, may_pass));
     }
     parts
 }
@@ -111,11 +106,7 @@ fn own_parts(
         corners.map(|vertex| record.point_to_world(vertex.position.into()).to_array())
     }));
     vertices.push([0.0; 3]);
-    let vertices = Vertices::Own(Arc::new(vertices));
-    [false, true].map(|is_passing| {
-        let wanted = triangles.clone().filter(|&triangle| {
-            may_pass(accel.triangle_materials[triangle as usize]) == is_passing
-        });
-        Part::new(vertices.clone(), triangles.start, instance, is_passing, wanted)
-    })
+    let may_pass = |triangle: u32| may_pass(accel.triangle_materials[triangle as usize]);
+    let first = triangles.start;
+    Part::pair(&Vertices::Own(Arc::new(vertices)), first, instance, triangles, may_pass)
 }
