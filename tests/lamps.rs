@@ -136,28 +136,32 @@ fn lamps_are_drawn_as_their_probabilities_say() {
 #[test]
 fn spots_are_drawn_where_they_shine() {
     let _alone = support::alone();
-    let mut scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
-    for spot in 0..40 {
-        let spot = Spot {
-            position: Vec3::new(2.0 * (spot - 20) as f32, 2.0, 0.0),
-            direction: if spot % 2 == 0 { Vec3::NEG_Y } else { Vec3::Y },
-            intensity: Vec3::ONE,
-            inner_angle_rad: 0.0,
-            outer_angle_rad: 0.8,
-            falloff: SpotFalloff::SquaredCosine,
+    for falloff in [SpotFalloff::SquaredCosine, SpotFalloff::SmoothCosine, SpotFalloff::LinearAngle]
+    {
+        let mut scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
+        for spot in 0..40 {
+            let spot = Spot {
+                position: Vec3::new(2.0 * (spot - 20) as f32, 2.0, 0.0),
+                direction: if spot % 2 == 0 { Vec3::NEG_Y } else { Vec3::Y },
+                intensity: Vec3::ONE,
+                inner_angle_rad: 0.0,
+                outer_angle_rad: 0.8,
+                falloff,
+            };
+            scenes::add_lamp(&mut scene, LampKind::Spot(spot));
+        }
+        let window = Window { x: 0, y: 0, width: 16, height: 8 };
+        let buffers = SceneBuffers::new(support::device(), &scene, window).unwrap();
+        let answers = draws(&buffers, [0.0; 3]);
+        let share = |is_wanted: fn(u32) -> bool| -> f64 {
+            let count =
+                answers.iter().filter(|answer| is_wanted(answer.source & !LAMP_BIT)).count();
+            count as f64 / answers.len() as f64
         };
-        scenes::add_lamp(&mut scene, LampKind::Spot(spot));
+        let [own, upwards] = [share(|spot| spot == 20), share(|spot| spot % 2 == 1)];
+        eprintln!("{falloff:?}: {own:.3} for the spot above, {upwards:.3} upwards");
+        assert!(own > 0.25 && upwards < 0.2, "{own} for the spot above, {upwards} upwards");
     }
-    let window = Window { x: 0, y: 0, width: 16, height: 8 };
-    let buffers = SceneBuffers::new(support::device(), &scene, window).unwrap();
-    let answers = draws(&buffers, [0.0; 3]);
-    let share = |is_wanted: fn(u32) -> bool| -> f64 {
-        let count = answers.iter().filter(|answer| is_wanted(answer.source & !LAMP_BIT)).count();
-        count as f64 / answers.len() as f64
-    };
-    let [own, upwards] = [share(|spot| spot == 20), share(|spot| spot % 2 == 1)];
-    eprintln!("{own:.3} for the spot above, {upwards:.3} for those that shine upwards");
-    assert!(own > 0.25 && upwards < 0.2, "{own} for the spot above, {upwards} upwards");
 }
 
 /// Alone, its lamp is all there is and drawn by power.

@@ -36,6 +36,37 @@ fn the_first_rule_that_is_reached_ends_the_render() {
 }
 
 #[test]
+fn what_a_file_asks_for_is_taken_where_no_option_says_otherwise() {
+    let folder = Folder::new();
+    let text = r#"<scene version="3.0.0">
+        <integrator type="path">
+            <integer name="max_depth" value="6"/><integer name="rr_depth" value="3"/>
+        </integrator>
+        <sensor type="perspective">
+            <sampler type="independent"><integer name="sample_count" value="2"/></sampler>
+            <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="8"/></film>
+        </sensor>
+        <emitter type="constant"/>
+        <shape type="sphere"><point name="center" x="0" y="0" z="4"/></shape>
+    </scene>"#;
+    folder.write("room.xml", text);
+    let render = |options: &[&str]| {
+        let command = ["render", "room.xml", "--sampler=mis", "--stats=stats.json"];
+        let run = folder.run(&[&command, options].concat());
+        run.assert(0, &[]);
+        let found: Statistics = folder.json("stats.json");
+        let roulette = found.sampler_parameters["roulette-depth"].clone();
+        (run.messages, (found.samples_per_pixel, found.depth, roulette))
+    };
+    let (said, found) = render(&[]);
+    assert!(said.contains("asks for depth 5, roulette from vertex 3, 2 samples"), "{said}");
+    assert_eq!(found, (2, 5, "3".into()));
+    let (said, found) = render(&["--spp=1", "--depth=4", "--roulette-depth=2"]);
+    assert!(!said.contains("asks for"), "{said}");
+    assert_eq!(found, (1, 4, "2".into()));
+}
+
+#[test]
 fn rays_are_counted_by_kind() {
     let folder = folder();
     let pixels = 40 * 24;
