@@ -198,13 +198,25 @@ fn tubes_have_the_volume_of_their_path() {
     assert_eq!(characteristic, 2);
     let capsule = shape("tube", &format!("round = true\n{straight}")).unwrap();
     assert_close(check_closed(&capsule).0, PI * 0.01 * 2.0 + 4.0 / 3.0 * PI * 0.001, 5e-3);
-    let tapered = "radius = [0.1, 0.2]\nsegments = 128\npath = [[0,0,0],[1,0,0]]";
-    assert_close(check_closed(&shape("tube", tapered).unwrap()).0, PI * 0.07 / 3.0, 1e-3);
+    let tapered = "radius = [0.1, 0.2]\nsegments = 128\npath = [[0,0,0],[2,0,0]]";
+    let tapered = shape("tube", tapered).unwrap();
+    assert_close(check_closed(&tapered).0, PI * 0.14 / 3.0, 1e-3);
+    let lean = -0.05 / 1.0_f32.hypot(0.05);
+    let is_side_or_end = |n: &[f32; 3]| n[0].abs() > 0.999 || (n[0] - lean).abs() < 1e-5;
+    assert!(tapered.normals.iter().all(is_side_or_end), "{:?}", tapered.normals);
     // A ring that leaves its plane: the frame has to close.
     let ring = "radius = 0.1\nclosed = true\nsmooth = 24\n\
         path = [[1,0.2,0],[0,-0.2,1],[-1,0.2,0],[0,-0.2,-1]]";
     let (_, characteristic) = check_closed(&shape("tube", ring).unwrap());
     assert_eq!(characteristic, 0);
+    // The first point may be given again as the last, with its radius.
+    for smooth in [1, 8] {
+        let of = |path: &str| {
+            let keys = "radius = 0.1\nclosed = true\npath = [[1,0,0],[0,0,1],[-1,0,0]";
+            shape("tube", &format!("smooth = {smooth}\n{keys}{path}]")).unwrap().positions
+        };
+        assert!(of("") == of(",[1,0,0]"), "smooth = {smooth}");
+    }
     let bent = "radius = 0.05\nround = true\npath = [[0,0,0],[0,1,0],[1,1,0],[1,1,1]]";
     assert_eq!(check_closed(&shape("tube", bent).unwrap()).1, 2);
     let sharp = "radius = 0.05\nsmooth = 1\npath = [[0,0,0],[0,1,0],[1,1,0],[1,1,1]]";

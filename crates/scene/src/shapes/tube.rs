@@ -76,13 +76,14 @@ impl Shape for Tube {
             let point = DVec3::from_array(point.map(f64::from));
             control.push(point.extend(positive("radius", *radius)?));
         }
+        // A closed path may end where it began; two points in one place would be a corner.
+        let is_end =
+            |control: &[DVec4]| control[0].truncate() == control[control.len() - 1].truncate();
+        while self.closed && control.len() > 1 && is_end(&control) {
+            control.pop();
+        }
         let mut points = curve::smooth(&control, smooth, self.closed);
         points.dedup_by_key(|point| point.truncate());
-        if self.closed
-            && points.first().map(|p| p.truncate()) == points.last().map(|p| p.truncate())
-        {
-            points.pop();
-        }
         if points.len() < needed {
             return Err("path: expected points that differ, found one".to_owned());
         }
