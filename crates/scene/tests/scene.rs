@@ -1195,6 +1195,16 @@ fn gltf_reads_nodes_from_every_kind_of_buffer() {
         assert_eq!(*base_color, Vec3::new(0.1, 0.6, 0.2));
         assert!(warnings[0].ends_with("ignored points and lines (mesh 0)"), "{warnings:?}");
     }
+    // The scene that is not rendered is named.
+    let scenes = r#"[{"name": "night", "nodes": [0]}, {"nodes": [0]}]"#;
+    let two = gltf_json(&inline).replace(r#""scene": 0"#, r#""scene": 1"#);
+    let path = folder.write("two.gltf", two.replace(r#"[{"nodes": [0]}]"#, scenes));
+    let mut warnings = Vec::new();
+    assert_eq!(Mesh::read(&path, &mut warnings).unwrap().triangles, [[0, 2, 1]]);
+    assert!(
+        warnings.iter().any(|line| line.contains("further scenes (scene `night`)")),
+        "{warnings:?}"
+    );
 }
 
 #[test]

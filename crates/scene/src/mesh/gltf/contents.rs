@@ -61,7 +61,8 @@ impl GltfReader<'_> {
             let place = || label("animation", animation.index(), animation.name());
             ignored.add(features::GLTF_ANIMATION, place);
         }
-        for scene in document.scenes().skip(1) {
+        let shown = document.default_scene().map_or(0, |scene| scene.index());
+        for scene in document.scenes().filter(|scene| scene.index() != shown) {
             ignored.add(features::GLTF_SCENES, || label("scene", scene.index(), scene.name()));
         }
         for part in OTHER_PARTS.split(' ') {
