@@ -41,16 +41,14 @@ impl GltfReader<'_> {
             let mut own = std::mem::replace(&mut self.mesh, whole);
             self.mesh.materials = std::mem::take(&mut own.materials);
             read?;
-            if own.runs.len() > 1 {
-                // An instance has one material.
-                self.repeated.insert(key, None);
-                return Ok(None);
-            }
-            let material = own.runs.first().and_then(|run| run.material);
-            let (mesh, places) = (Box::new(own), Vec::new());
-            let repeated = RepeatedMesh { name: String::new(), mesh, material, places };
-            self.mesh.repeated.push(repeated);
-            Some(self.mesh.repeated.len() - 1)
+            // An instance has one material.
+            (own.runs.len() <= 1).then(|| {
+                let material = own.runs.first().and_then(|run| run.material);
+                let (mesh, places) = (Box::new(own), Vec::new());
+                let repeated = RepeatedMesh { name: String::new(), mesh, material, places };
+                self.mesh.repeated.push(repeated);
+                self.mesh.repeated.len() - 1
+            })
         } else {
             None
         };
