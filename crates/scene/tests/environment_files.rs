@@ -305,7 +305,8 @@ fn the_sun_stands_where_it_should_with_the_power_it_should() {
             let map = EnvironmentMap::sky(&parameters, 1.0).unwrap();
             // 90° clockwise from −Z is +X.
             let sun = Vec3::new(0.866_025_4, 0.5, 0.0);
-            let reach = (radius_deg + 2.0 * 360.0 / width as f32).to_radians().cos();
+            // The middle of a texel lies within half its diagonal of the disc.
+            let reach = (radius_deg + 0.75 * 360.0 / width as f32).to_radians().cos();
             let near = flux(&map, |direction| direction.dot(sun) > reach);
             let expected =
                 1e5 * 2.0 * std::f64::consts::PI * (1.0 - f64::from(radius_deg).to_radians().cos());
@@ -317,16 +318,27 @@ fn the_sun_stands_where_it_should_with_the_power_it_should() {
 
 #[test]
 fn procedural_maps_are_lit_as_their_names_say() {
-    let sky = EnvironmentMap::sky(&SkyParameters::default(), 1.0).unwrap();
+    let parameters = SkyParameters::default();
+    let sky = EnvironmentMap::sky(&parameters, 1.0).unwrap();
     let brightest = sky.texels.iter().map(|texel| luminance(*texel)).fold(0.0, f32::max);
     assert!(brightest > 1e4, "{brightest}");
-    let horizon = sky.radiance(Vec3::new(-1.0, 0.02, 0.0).normalize());
-    assert!(luminance(horizon) > luminance(sky.radiance(Vec3::Y)));
+    // Away from the sun, the glow about it is gone.
+    let opposite = Vec3::new(-50_f32.to_radians().sin(), 3e-3, 50_f32.to_radians().cos());
+    for (direction, expected) in [(Vec3::Y, parameters.zenith), (opposite, parameters.horizon)] {
+        let found = sky.radiance(direction);
+        assert!(found.abs_diff_eq(expected.into(), 0.03), "{found} instead of {expected:?}");
+    }
 
     let court = EnvironmentMap::court(&CourtParameters::default(), 1.0).unwrap();
     assert_eq!((court.width, court.height), (1024, 512));
     let (up, wall) = (court.radiance(Vec3::Y), court.radiance(Vec3::new(1.0, 0.3, 0.2)));
+    assert!(up.abs_diff_eq(CourtParameters::default().sky.into(), 0.1), "{up}");
     assert!(luminance(up) > 10.0 * luminance(wall));
+    // A gateway in the facade toward −Z, 45 m away, is a round arch of 9 m that shows the sky.
+    let facade = |height: f32| luminance(court.radiance(Vec3::new(0.0, height - 1.7, -45.0)));
+    assert!(facade(8.0) > 5.0 && facade(10.0) < 1.0, "{} {}", facade(8.0), facade(10.0));
+    let paving = |side: f32| flux(&court, |way| way.y < -0.3 && side * way.x > 0.0);
+    assert!((paving(1.0) / paving(-1.0) - 1.0).abs() < 0.1, "{} {}", paving(1.0), paving(-1.0));
     let sky_share = flux(&court, |direction| direction.y > 0.7) / flux(&court, |_| true);
     assert!((0.4..0.95).contains(&sky_share), "{sky_share}");
     let glints = court.texels.iter().filter(|texel| texel.x > 30.0).count();

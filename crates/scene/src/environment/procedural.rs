@@ -67,3 +67,19 @@ pub(super) fn render(width: u32, grid: usize, radiance: impl Fn(Vec3) -> Vec3 + 
     });
     texels
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::frame::lat_long_from_direction;
+
+    /// The mean of u·v is the product of their means if samples fill the square, and not on its diagonal.
+    #[test]
+    fn samples_fill_their_texel() {
+        let texels = render(2, 2, |direction| {
+            let Vec2 { x, y } = lat_long_from_direction(direction);
+            Vec3::new(x, y, x * y)
+        });
+        assert!(texels[0].abs_diff_eq(Vec3::new(0.25, 0.5, 0.125), 1e-5), "{}", texels[0]);
+    }
+}
