@@ -269,6 +269,10 @@ fn grids_are_sheets_of_their_thickness() {
     assert_eq!(check_closed(&mesh).1, 2);
     let highest = mesh.positions.iter().map(|position| position[1]).fold(0.0, f32::max);
     assert!((highest - 0.052).abs() < 1e-3, "{highest}");
+    // The steepest slope of the wave is 2π · 0.05 / 0.25, along x.
+    let steepest = mesh.normals.iter().filter(|normal| normal[1] > 0.1).map(|normal| normal[0]);
+    let expected = (0.4 * PI as f32).atan().sin();
+    assert!((steepest.fold(0.0, f32::max) - expected).abs() < 1e-2);
     let hill = "size = [1.0, 1.0]\nthickness = 0.002\nheights = [[0,0,0],[0,0.3,0],[0,0,0]]";
     let mesh = shape("grid", hill).unwrap();
     assert_eq!(check_closed(&mesh).1, 2);
