@@ -9,6 +9,7 @@ use std::{
 
 use fenestra_scene::measured::{
     CELL_COUNT, MeasuredTable, bin_directions, cell_index,
+    lookup::half_difference_angles,
     merl::{FILE_BYTES, HEADER_BYTES, SCALES},
 };
 use glam::Vec3;
@@ -85,6 +86,20 @@ fn merl_index_has_its_closed_form() {
     assert!(theta_half > lower && theta_half < upper, "{lower}, {theta_half}, {upper}");
     let theta_difference = incident.dot(half_vector).acos().to_degrees();
     assert!((theta_difference - 30.5).abs() < 1e-3, "{theta_difference}");
+}
+
+/// Directions in one plane with the normal differ within it, and those beside a half vector in such a plane
+/// across it, whichever comes first.
+#[test]
+fn differences_lie_in_the_plane_of_the_normal_or_across_it() {
+    let at = |x: f32, y: f32| Vec3::new(x, y, (1.0 - x * x - y * y).sqrt());
+    for (a, b, phi) in [((0.6, 0.0), (0.2, 0.0), 0.0), ((0.4, 0.3), (0.4, -0.3), FRAC_PI_2 as f32)]
+    {
+        for (one, other) in [(a, b), (b, a)] {
+            let angles = half_difference_angles(at(one.0, one.1), at(other.0, other.1));
+            assert_eq!(angles.z, phi, "{one:?} {other:?}");
+        }
+    }
 }
 
 /// Invalid cells take a neighbour's value, are counted, and never reach the shader.

@@ -296,4 +296,40 @@ mod tests {
         let ratio = sums[0] / sums[1];
         assert!((ratio - 1.0).abs() < 3e-3, "{ratio}");
     }
+
+    /// Samples divided by their density integrate what has a closed form over the hemisphere.
+    #[test]
+    fn samples_are_as_dense_as_stated() {
+        let table = MeasuredTable::tabulate(|outgoing, incident| {
+            let half_vector = (outgoing + incident).normalize();
+            Vec3::splat(0.1 + 0.2 * (-(half_vector.z.acos() / 0.4).powi(2)).exp())
+        });
+        let table = table.unwrap();
+        let words = table.words();
+        let outgoing = vec3(0.6, 0.0, 0.8);
+        let count = 100_000;
+        let mut sums = [0.0_f64; 4];
+        for sample in 1..=count {
+            // The additive sequence of the plastic number for three dimensions.
+            let digit =
+                |power: i32| (f64::from(sample) * 1.220_744_084_605_759_5_f64.powi(-power)).fract();
+            let u = vec3(digit(1) as f32, digit(2) as f32, digit(3) as f32);
+            let way = lookup::measured_sample(words, 0, outgoing, u);
+            if way.z <= 0.0 {
+                continue;
+            }
+            let theta_half = lookup::half_difference_angles(outgoing, way).x;
+            let pdf = lookup::measured_pdf(words, 0, outgoing, way, theta_half);
+            let moments = [1.0, way.x * way.x, way.y * way.y, way.x];
+            for (sum, moment) in sums.iter_mut().zip(moments) {
+                *sum += f64::from(way.z * moment / pdf);
+            }
+        }
+        let pi = std::f64::consts::PI;
+        let expected = [pi, 0.25 * pi, 0.25 * pi, 0.0];
+        for (sum, expected) in sums.iter().zip(expected) {
+            let found = sum / f64::from(count);
+            assert!((found - expected).abs() < 0.01, "{found} instead of {expected}");
+        }
+    }
 }
