@@ -240,6 +240,15 @@ mod tests {
         assert_eq!(geometry.materials, [1]);
         assert_eq!(geometry.normals.len(), geometry.positions.len());
         assert!(geometry.positions.iter().all(|position| is_finite(*position)));
+        let mut both = DroppedOfMany::default();
+        both.add(dropped, 5, || "sail".to_owned());
+        both.add(Dropped { degenerate: 1, ..Dropped::default() }, 2, String::new);
+        let dropped = "a.gltf: sail and 1 others: dropped";
+        let expected = [
+            format!("{dropped} 4 triangles of zero area of 7"),
+            format!("{dropped} 1 triangles with infinite or NaN corners of 7"),
+        ];
+        assert_eq!(both.warnings(Path::new("a.gltf")), expected);
     }
 
     #[test]

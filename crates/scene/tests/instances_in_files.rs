@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use crate::support::{
     folder::Folder,
-    gltf::{base64, floats},
+    gltf::{base64, floats, png},
 };
 
 /// Edges of squares of the repeated mesh, each of two triangles.
@@ -81,8 +81,12 @@ fn compare_scenes(few: &Scene, many: &Scene, instances: usize) {
             assert!(error < 1e-4, "a corner at {found} instead of {expected}");
         }
     }
-    let (few, many) = (&few.geometry, many.geometry.clone().flattened().unwrap());
-    assert_eq!(few.materials[0], many.materials[0]);
+    let flat = many.geometry.clone().flattened().unwrap();
+    assert!(many.geometry.materials_in_use().eq(flat.materials.iter().copied()));
+    let few = &few.geometry;
+    assert_eq!(few.materials[0], flat.materials[0]);
+    let end = |tangents: &[[f32; 4]]| tangents.last().map(|tangent| tangent.map(f32::round));
+    assert_eq!(end(&few.tangents), end(&flat.tangents));
 }
 
 /// Loads what `text` gives for few and for many uses, and compares the last uses of both.
@@ -167,19 +171,25 @@ fn document(nodes: &str, roots: &str, instances: &[f32], rest: &str) -> String {
     bytes.extend(floats(instances));
     format!(
         r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [{roots}]}}], "nodes": [{nodes}],
-        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "indices": 1}}]}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0, "TEXCOORD_0": 3}}, "indices": 1,
+            "material": 0}}]}}],
+        "materials": [{{"normalTexture": {{"index": 0}}}}], "textures": [{{"source": 0}}],
+        "images": [{{"uri": "data:image/png;base64,{}"}}],
         "accessors": [
           {{"bufferView": 0, "componentType": 5126, "count": {}, "type": "VEC3",
             "min": [0, 0, -1], "max": [1, 1, 1]}},
           {{"bufferView": 1, "componentType": 5125, "count": {}, "type": "SCALAR"}},
-          {{"bufferView": 2, "componentType": 5126, "count": {}, "type": "VEC3"}}],
-        "bufferViews": [{{"buffer": 0, "byteLength": {indices}}},
+          {{"bufferView": 2, "componentType": 5126, "count": {}, "type": "VEC3"}},
+          {{"bufferView": 0, "componentType": 5126, "count": {}, "type": "VEC2"}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": {indices}, "byteStride": 12}},
           {{"buffer": 0, "byteOffset": {indices}, "byteLength": {}}},
           {{"buffer": 0, "byteOffset": {shifts}, "byteLength": {}}}],
         "buffers": [{{"byteLength": {}, "uri": "data:;base64,{}"}}]{rest}}}"#,
+        base64(&png([[128, 128, 255, 255]; 2])),
         positions.len(),
         3 * triangles.len(),
         instances.len() / 3,
+        positions.len(),
         shifts - indices,
         bytes.len() - shifts,
         bytes.len(),
@@ -207,6 +217,14 @@ fn nested_nodes(uses: usize) -> String {
 #[test]
 fn gltf_nodes() {
     compare("room.gltf", MANY, nested_nodes);
+    // Lights are sampled by their triangles, which instances do not have in the world.
+    let lit = nested_nodes(MANY).replace("\"normalT", "\"emissiveFactor\": [1, 1, 1], \"normalT");
+    let folder = Folder::new();
+    let scene = Scene::load(&folder.write("lit.gltf", lit)).unwrap();
+    assert_eq!(
+        (scene.geometry.instances.len(), scene.geometry.triangles.len()),
+        (0, MANY * TRIANGLES)
+    );
 }
 
 #[test]
