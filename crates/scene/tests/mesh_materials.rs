@@ -109,7 +109,7 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
     let (found, _) = gltf_material(&folder, "{}", "");
     assert!(matches!(
         found.kind,
-        MaterialKind::Principled(Principled { metallic: 1.0, roughness: 1.0, .. })
+        MaterialKind::Principled(Principled { metallic: 1.0, roughness: 1.0, specular: 1.0, .. })
     ));
     assert!(found.surface.emission.is_none());
     let one_sided = r#"{"emissiveFactor": [1, 1, 1]}"#;
@@ -283,6 +283,20 @@ fn specular_glossiness_is_converted_texel_by_texel() {
     assert!((color[1][0] - 0.791).abs() < 0.01, "{color:?}");
     assert!(color[0][3] == 1.0 && (color[1][3] - 0.502).abs() < 0.01, "{color:?}");
 
+    let kind = &found.kind;
+    assert!(
+        matches!(kind, MaterialKind::Principled(Principled { roughness: 1.0, .. })),
+        "{kind:?}"
+    );
+
+    // The larger image sets the texels: the others are read at the middles of those.
+    let specular = image::RgbaImage::from_pixel(4, 1, image::Rgba([230, 230, 230, 128]));
+    specular.save(folder.path().join("wide.png")).unwrap();
+    let (found, _) = gltf_material(&folder, &material(""), &rest.replace("s.png", "wide.png"));
+    let opacity = values(&found.surface.color).iter().map(|color| color[3]).collect::<Vec<_>>();
+    let expected = [0.75, 0.75, 0.25, 0.25].map(|left| left + (1.0 - left) * 128.0 / 255.0);
+    assert!(opacity.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3), "{opacity:?}");
+
     // On other coordinates the mean of the specular colour counts, and the diffuse image stays.
     let turned = r#", "extensions": {"KHR_texture_transform": {"scale": [2, 2]}}"#;
     let (found, warnings) = gltf_material(&folder, &material(turned), rest);
@@ -320,6 +334,11 @@ fn transmission_by_texture_is_glass_where_it_says_so() {
     assert_eq!((of(0.0).name.as_str(), of(2.0).name.as_str()), ("lamp, glass", "lamp"));
     let is_named = |text: &&String| text.contains("glass or opaque by its mean there");
     assert_eq!(scene.warnings.iter().filter(is_named).count(), 1, "{:?}", scene.warnings);
+
+    let unlit =
+        material.replace("\"extensions\": {", "\"extensions\": {\"KHR_materials_unlit\": {}, ");
+    let path = folder.write("c.gltf", gltf_of(&attributes, 6, &unlit, rest));
+    assert!(Scene::load(&path).unwrap().materials.iter().all(|own| own.name != "lamp, glass"));
 
     // Factor times texel is less than half.
     folder.write("t.png", png([[150, 0, 0, 255], [0, 0, 0, 255]]));
@@ -363,6 +382,35 @@ fn quantized_attributes_are_numbers() {
     assert!(mesh.materials[0].material.surface.vertex_color);
     assert_eq!(load(r#"{"alphaMode": "MASK"}"#).colors[0], mesh.colors[0]);
     assert_eq!(load("{}").colors[2], [0.0, 0.0, 0.0, 1.0], "opaque materials ignore alpha");
+}
+
+#[test]
+fn sparse_accessors_replace_elements_of_a_view_or_of_zeros() {
+    let text = gltf(r#"{"mesh": 0}"#, "", "", "");
+    let sparse = r#"{"sparse": {"count": 1, "indices": {"bufferView": 2, "componentType": 5121},
+        "values": {"bufferView": 1}}, "componentType""#;
+    let view = r#"{"bufferView": 0, "componentType""#;
+    for (sparse, last) in
+        [(sparse.to_owned(), 0.0), (sparse.replace("{\"sp", "{\"bufferView\": 0, \"sp"), 1.0)]
+    {
+        let folder = Folder::new();
+        let path = folder.write("a.gltf", text.replace(view, &sparse));
+        let mesh = Mesh::read(&path, &mut Vec::new()).unwrap();
+        assert_eq!(mesh.positions, [[0.0; 3], [0.0, 0.0, 7.0], [0.0, last, 0.0]]);
+    }
+}
+
+#[test]
+fn normals_stand_on_stretched_surfaces() {
+    let attributes = [positions(), Attribute::floats("NORMAL", "VEC3", &[1.0, 0.0, 0.0].repeat(3))];
+    // An eighth of a turn about z, then twice as wide: the line along (−1, 1) becomes (−2, 1).
+    let nodes = r#"[{"children": [1], "scale": [2, 1, 1]},
+        {"mesh": 0, "rotation": [0, 0, 0.38268343, 0.92387953]}]"#;
+    let text = gltf_of(&attributes, 3, "", "").replace(r#"[{"mesh": 0}]"#, nodes);
+    let folder = Folder::new();
+    let mesh = Mesh::read(&folder.write("a.gltf", text), &mut Vec::new()).unwrap();
+    let expected = Vec3::new(1.0, 2.0, 0.0).normalize().to_array();
+    assert!(close(mesh.normals[0].into(), expected), "{:?}", mesh.normals);
 }
 
 #[test]
@@ -567,6 +615,12 @@ fn mtl_materials_become_surfaces() {
     for keys in ["Ks 0.5\nillum 3", "Ks 0.5\nillum 7\nd 0.8", "Ks 0.5", "Kd 0\nKs 0.5\nillum 2"] {
         assert!(matches!(kind(keys), MaterialKind::Plastic { .. }), "{keys}");
     }
+    let debug = |keys: &str| format!("{:?}", kind(keys));
+    assert_eq!(debug("Ks 0.5\nNs -3"), debug("Ks 0.5"), "no exponent");
+    let deep = image::ImageBuffer::from_pixel(1, 1, image::Rgba([9000_u16, 9000, 9000, 30_000]));
+    deep.save(folder.path().join("deep.png")).unwrap();
+    let surface = mtl_material(&folder, "map_Kd deep.png").0.surface;
+    assert_eq!(surface.opacity.texture.map(|used| used.channels), Some(Channels::Alpha));
     let (found, _) = mtl_material(&folder, "Kd 0.5\nPr 0.3\nmap_Pm grey.png\nKs 1\nKe 2 1 0");
     let MaterialKind::Principled(Principled { metallic, roughness, .. }) = found.kind else {
         panic!()
@@ -634,16 +688,17 @@ fn ply_coordinates_and_colours_are_read() {
         let text = format!(
             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
              property float z\nproperty float {v}\nproperty float {u}\nproperty uchar red\n\
-             property uchar green\nproperty uchar blue\nelement face 1\n\
+             property ushort green\nproperty uchar blue\nelement face 1\n\
              property list uchar int vertex_indices\nend_header\n\
-             0 0 0 0.1 0.2 255 0 188\n1 0 0 0.3 0.4 0 0 0\n0 1 0 0.5 0.6 0 0 0\n3 0 1 2\n"
+             0 0 0 0.1 0.2 255 48316 188\n1 0 0 0.3 0.4 0 0 0\n0 1 0 0.5 0.6 0 0 0\n3 0 1 2\n"
         );
         let mut warnings = Vec::new();
         let mesh = Mesh::read(&folder.write("a.ply", text), &mut warnings).unwrap();
         assert_eq!(mesh.uvs[0], [[0.2, 0.1], [0.4, 0.3], [0.6, 0.5]]);
         assert_eq!(warnings, [""; 0]);
         let [r, g, b, a] = mesh.colors[0];
-        assert!((r, g, a) == (1.0, 0.0, 1.0) && (b - 0.5029).abs() < 1e-3, "{b}");
+        // 48316 of 65535 is 188 of 255.
+        assert!((r, g, a) == (1.0, b, 1.0) && (b - 0.5029).abs() < 1e-3, "{g} {b}");
     }
     let clay = "type = \"diffuse\"\nreflectance = [1, 1, 1]";
     let toml = |clay: &str| folder::yard([8, 8], "constant = [1, 1, 1]", clay, "mesh = \"a.ply\"");

@@ -1062,6 +1062,10 @@ fn broken_ply_files_are_refused_with_their_place() {
         &set("1 1 0", "1 one 0"),
         "broken.ply:12:1: vertex 2 of 4: expected a number, found `one`",
     );
+    case(
+        &set("1 1 0", &format!("{} 1 0", "1".repeat(65))),
+        "broken.ply:12:1: vertex 2 of 4: expected a number, found a long word",
+    );
     case(&set("element face", "element tristrips"), "expected one element `face`, found 0");
     let binary = binary_ply(false);
     case(&binary[..binary.len() - 1], "truncated: the file ends in face 1 of 2");
@@ -1076,10 +1080,10 @@ fn broken_ply_files_are_refused_with_their_place() {
 fn obj_reads_groups_polygons_normals_and_colors() {
     let folder = Folder::new();
     folder.write(
-        "colors.mtl",
+        "two colors.mtl",
         "# two\nnewmtl red paint\nKd 0.8 0.1 0.1\nNs 10\nnewmtl grey\nKd 0.5\n",
     );
-    let text = "# a square and two triangles\nmtllib colors.mtl\nv 0 0 0\nv 1 0 0 1.0\nv 1 1 0\nv 0 1 0\n\
+    let text = "# a square and two triangles\nmtllib  two colors.mtl \nv 0 0 0\nv 1 0 0 1.0\nv 1 1 0\nv 0 1 0\n\
         vt 0 0\nvn 0 0 1\nvn 0 0 -1\no first\ng a b\nusemtl red paint\nf 1//1 2//1 3//1 4//1\n\
         s off\ng c\nusemtl grey\nf -4/1/2 \\\n -2/1/2 -3/1/2\nl 1 2\nf 1 2 3\n";
     let mesh = read(&folder, "shapes.obj", text);
