@@ -126,7 +126,9 @@ fn half_and_integer_channels_of_other_programs_become_floats() {
 fn a_missing_channel_is_named_beside_those_that_are_there() {
     let mut image = example();
     image.channels.remove("G");
-    let message = image.rgb(Path::new("in.exr")).unwrap_err().to_string();
+    let path = Path::new("in.exr");
+    assert_eq!(example().layer("", path).unwrap(), example().rgb(path).unwrap());
+    let message = image.rgb(path).unwrap_err().to_string();
     assert_eq!(message, "in.exr: expected channels R, G, B (or Y), found B, N.X, R");
 }
 
