@@ -103,6 +103,16 @@ fn arrays_stand_for_files() {
     let scene = parse(&arrays).unwrap();
     assert_eq!(scene.hash, files.hash);
     assert_eq!(scene.inputs, [Path::new("nowhere/room")]);
+    // Colours of vertices count where the material says so.
+    let colors = vec![[0.5, 0.25, 0.125, 1.0]; 4];
+    let meshes = [(mesh.clone(), Mesh { colors, ..quad.clone() })].into();
+    let painted = Arrays { meshes, images: arrays.images.clone() };
+    let scene = parse(&painted).unwrap();
+    assert!(scene.geometry.colors.is_empty() && scene.warnings[0].contains("the vertex colours"));
+    let colored = text.replace("name = \"print\"", "name = \"print\"\nvertex_color = true");
+    let path = Path::new("nowhere/room");
+    let scene = Scene::parse_with(path, &colored, &LoadOptions::default(), &painted).unwrap();
+    assert!(scene.geometry.colors.len() == 4 && scene.warnings.is_empty(), "{:?}", scene.warnings);
     let meshes = [(mesh, Mesh { uvs: [vec![[0.0; 2]], Vec::new()], ..quad })].into();
     let message = parse(&Arrays { meshes, ..arrays }).unwrap_err().to_string();
     assert!(message.ends_with("uvs: expected one for each of 4 positions, found 1"), "{message}");
@@ -145,6 +155,15 @@ fn defaults_are_those_of_the_format() {
     assert_eq!(scene.film.filter, fenestra_scene::Filter::Gaussian);
     assert_eq!(scene.geometry.triangles.len(), 12);
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+}
+
+#[test]
+fn a_camera_that_is_moved_alone_keeps_its_direction() {
+    let folder = Folder::new();
+    let path = folder.write("room.toml", with_box(""));
+    let options = LoadOptions { look_from: Some([2.0, 3.0, 9.0]), ..LoadOptions::default() };
+    let camera = Scene::load_with(&path, &options).unwrap().camera;
+    assert_eq!((camera.position, camera.look_at), ([2.0, 3.0, 9.0].into(), [2.0, 3.0, 4.0].into()));
 }
 
 #[test]
@@ -388,6 +407,12 @@ fn numbers_that_cannot_be_rendered_are_refused_by_name() {
         "ior: expected a number from 1.01 to 4, found 0.5",
     );
     case(
+        &material(
+            "type = \"principled\"\nbase_color = [0, 0, 0]\nmetallic = 0\nroughness = 1\nior = 5",
+        ),
+        "ior: expected a number from 1 to 4, found 5",
+    );
+    case(
         &material("type = \"conductor\"\nalpha = 0.1"),
         "a conductor needs either reflectance, or eta and k",
     );
@@ -477,11 +502,18 @@ fn materials_take_textures_opacity_and_emission() {
         name = \"silver\"
         type = \"mirror\"
         reflectance = {{ texture = \"wood.png\" }}
-        emission = {{ texture = \"wood.png\", factor = [10, 20, 30] }}"
+        emission = {{ texture = \"wood.png\", factor = [10, 20, 30] }}
+        [[material]]
+        name = \"steel\"
+        type = \"conductor\"
+        reflectance = [0.5, 0.5, 0.6]
+        roughness = {{ texture = \"wood.png\", factor = 0.5 }}"
     );
     let scene = load(&folder, &text).unwrap();
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
-    let [_, wood, glass, frosted, pane, silver] = &scene.materials[..] else { unreachable!() };
+    let [_, wood, glass, frosted, pane, silver, steel] = &scene.materials[..] else {
+        unreachable!()
+    };
     let MaterialKind::Principled(Principled {
         base_color, metallic, roughness, ior, specular, ..
     }) = wood.kind
@@ -517,6 +549,7 @@ fn materials_take_textures_opacity_and_emission() {
     let emission = silver.surface.emission.as_ref().unwrap();
     assert_eq!(emission.radiance, Vec3::new(10.0, 20.0, 30.0));
     assert_eq!(emission.texture.as_ref().unwrap().encoding, Encoding::Srgb);
+    assert!(matches!(steel.kind, MaterialKind::Conductor { alpha: 0.25, .. }), "{:?}", steel.kind);
     let wood = folder.path().join("wood.png");
     assert_eq!(scene.inputs.iter().filter(|input| input.ends_with("wood.png")).count(), 1);
     assert!(scene.inputs.contains(&wood));
@@ -713,7 +746,7 @@ fn lamps_and_objects_name_groups_of_lights() {
         warnings[0].ends_with("ignored light_group: the object emits no light"),
         "{warnings:?}"
     );
-    for (name, text) in [("", &lamp), ("a.b", &lamp)] {
+    for (name, text) in [("", lamp), ("a.b", &object("light_group = \"key\""))] {
         let message = message(&folder, &format!("{dark}{}", text.replace("key", name)));
         let expected = format!(
             "light_group: expected up to 63 letters, digits, spaces, `_` and `-`, \
@@ -864,6 +897,9 @@ fn an_included_file_names_the_group_of_its_lights() {
     let replaced = scene(replaced);
     assert_eq!(groups(&replaced), ["environment", "ceiling", "lamps"]);
     assert_eq!(lit(&replaced).as_deref(), Some("ceiling"));
+    let one = format!("{quad}AreaLightSource \"diffuse\"\n{quad}");
+    folder.write("one.pbrt", format!("Camera \"perspective\"\nWorldBegin\n{one}"));
+    assert_eq!(scene("\"one.pbrt\"\nlight_group = \"ceiling\"").warnings, [""; 0]);
     let dark = scene("\"quad.pbrt\"\nlight_group = \"ceiling\"").warnings;
     assert!(
         dark.iter().any(|line| line.ends_with("ignored light_group: the file emits no light")),
@@ -1083,8 +1119,8 @@ fn obj_reads_groups_polygons_normals_and_colors() {
         "two colors.mtl",
         "# two\nnewmtl red paint\nKd 0.8 0.1 0.1\nNs 10\nnewmtl grey\nKd 0.5\n",
     );
-    let text = "# a square and two triangles\nmtllib  two colors.mtl \nv 0 0 0\nv 1 0 0 1.0\nv 1 1 0\nv 0 1 0\n\
-        vt 0 0\nvn 0 0 1\nvn 0 0 -1\no first\ng a b\nusemtl red paint\nf 1//1 2//1 3//1 4//1\n\
+    let text = "# a square and two triangles\nmtllib  two colors.mtl \nv 0 0 0\nv 1 0 0 1.0\nv 1 1 0\n\
+        v 0 1 0\nvt 0 0\nvn 0 0 1\nvn 0 0 -1\no first\ng a b\nusemtl red paint\nf 1//1 2//1 3//1 4//1\n\
         s off\ng c\nusemtl grey\nf -4/1/2 \\\n -2/1/2 -3/1/2\nl 1 2\nf 1 2 3\n";
     let mesh = read(&folder, "shapes.obj", text);
     assert_eq!(mesh.triangles.len(), 4);
