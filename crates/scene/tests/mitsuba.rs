@@ -396,6 +396,15 @@ fn normal_maps_stand_on_the_tangents_of_mitsuba() {
         assert_eq!(scene.geometry.tangents, [tangent; 4]);
     }
 }
+    // Red is metal by its luminance, 0.2126.
+    let red = ["color0", "color1"].map(|name| format!("<rgb name=\"{name}\" value=\"1 0 0\"/>"));
+    let (found, _) = material(&format!(
+        "<bsdf type=\"principled\"><texture name=\"metallic\" type=\"checkerboard\">{}</texture>\
+         <float name=\"roughness\" value=\"0.3\"/></bsdf>",
+        red.concat()
+    ));
+    let MaterialKind::Principled(Principled { base_color, .. }) = found.kind else { panic!() };
+    assert_close(base_color, Vec3::splat(0.5 * (1.0 + 0.7874 * 0.031)));
 
 /// The image lies once on a rectangle of 2 × 2 units.
 #[test]
@@ -1067,11 +1076,10 @@ fn widths_and_colours_by_place_are_read() {
             let image = fenestra_scene::texture::Texture::load(&path, &mut Vec::new()).unwrap();
             image.linear_texels(Encoding::Linear)
         });
-        for (root, width) in roots.iter().zip(widths) {
-            assert!(
-                (root[0] * root[0] - width[0].clamp(1e-3, 1.0)).abs() < 2e-3,
-                "{root:?} {width:?}"
-            );
+        // A number of colours is their luminance, as in `eval_1` of Mitsuba's `bitmap`.
+        for (root, [red, green, blue, _]) in roots.iter().zip(widths) {
+            let width = 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+            assert!((root[0] * root[0] - width).abs() < 2e-3, "{root:?} {width}");
         }
     }
     let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\

@@ -232,7 +232,7 @@ impl Lobes {
 }
 
 /// The one number of an image, as the value of all channels.
-fn numbers(image: &TextureUse) -> TextureUse {
+pub(crate) fn numbers(image: &TextureUse) -> TextureUse {
     if image.channels != Channels::Color {
         return image.clone();
     }

@@ -15,7 +15,7 @@ use crate::{
     coat::{COAT_IOR, LossyCoat, albedo_below_coat},
     error::Result,
     features,
-    import::{SOLID_IOR, Width, media},
+    import::{SOLID_IOR, Width, blend::numbers, media},
     material::{ConductorFresnel, Material, MaterialKind, Surface},
     math::colour::luminance,
 };
@@ -236,7 +236,7 @@ impl Reader {
         Ok(match value {
             Some(Value::Texture(texture)) => {
                 let root = |alpha: f32| alpha.clamp(MIN_ALPHA, 1.0).sqrt();
-                Width { alpha: 1.0, texture: Some(texture.mapped(root)) }
+                Width { alpha: 1.0, texture: Some(numbers(&texture).mapped(root)) }
             }
             value => {
                 let alpha = self.without_texture(value, node, features::MI_ALPHA_TEXTURE);

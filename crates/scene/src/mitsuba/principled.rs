@@ -9,6 +9,7 @@ use crate::{
     error::Result,
     features,
     material::{Material, MaterialKind, Principled},
+    math::colour::luminance,
 };
 
 /// Parameters without a counterpart, which change nothing at 0.
@@ -68,8 +69,8 @@ impl Reader {
             return Ok(model);
         }
         // The base of metal reflects alike in both.
-        let diffuse_share = 1.0 - metallic.mean().x.clamp(0.0, 1.0);
-        let factor = principled_base_factor(roughness.mean().x, normal_reflectance(ior));
+        let diffuse_share = 1.0 - luminance(metallic.mean()).clamp(0.0, 1.0);
+        let factor = principled_base_factor(luminance(roughness.mean()), normal_reflectance(ior));
         let factor = 1.0 + diffuse_share * (factor - 1.0);
         let base = base.mapped(|albedo| (factor * albedo).clamp(0.0, 1.0));
         let (metallic, metallic_texture) = metallic.split();

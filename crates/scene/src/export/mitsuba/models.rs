@@ -17,6 +17,7 @@ use crate::{
         triple,
     },
     material::{ConductorFresnel, MaterialKind},
+    math::colour::luminance,
     measured::RglTraits,
     texture::TextureUse,
 };
@@ -188,8 +189,8 @@ impl Translator<'_> {
     /// Base of Mitsuba's plastic, which loses light below its coat, that reflects as much as ours.
     fn plastic_base(&mut self, diffuse: Vec3, alpha: f32, ior: f32) -> Vec3 {
         let surface = self.subject.surface;
-        let mean = |used: &Option<TextureUse>| used.as_ref().map_or(1.0, |used| used.mean()[0]);
-        let root = mean(&surface.roughness);
+        let roughness = surface.roughness.as_ref();
+        let root = roughness.map_or(1.0, |used| luminance(used.mean().into()));
         let factor = LossyCoat::new(alpha * root * root, ior).base_factor();
         let texels = surface.color.iter().flat_map(|used| used.values());
         let lightest = texels.map(|[r, g, b, _]| r.max(g).max(b)).reduce(f32::max).unwrap_or(1.0)

@@ -107,9 +107,8 @@ impl<'a> Translator<'a> {
                 fresnel: ConductorFresnel::Schlick { reflectance },
             } => self.metal(*reflectance, *alpha),
             MaterialKind::Principled(own) => {
-                let texture = self.subject.surface.metallic.as_ref();
-                let share = own.metallic * texture.map_or(1.0, |used| used.mean()[0]);
-                if share > 0.0 && share < 1.0 || texture.is_some() {
+                let (share, _) = self.subject.mean_metal_and_roughness();
+                if share > 0.0 && share < 1.0 || self.subject.surface.metallic.is_some() {
                     self.subject
                         .warn("pbrt mixes no metal with others; the greater share is all of it");
                 }
