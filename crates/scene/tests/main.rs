@@ -6,6 +6,7 @@ mod animation;
 mod brdf_formats;
 mod compressed_meshes;
 mod environment_files;
+mod export;
 mod exr;
 mod fuzz;
 mod import;

@@ -199,5 +199,6 @@ mod tests {
             assert!(is_exact && pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-5), "{found}");
         }
         assert!(!transform([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0]]).1);
+        assert_eq!(transform(SAME_UV), (None, true));
     }
 }

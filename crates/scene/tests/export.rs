@@ -1,0 +1,187 @@
+//! Exports to glTF and pbrt: what a format has no place for is named, and the rest comes back.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests may panic")]
+
+use fenestra_scene::{
+    Scene,
+    export::{Settings, gltf, mitsuba, pbrt},
+    load::LoadOptions,
+    material::MaterialKind,
+    texture::Texels,
+};
+use glam::Vec3;
+
+use crate::support::folder::{Folder, yard};
+
+const SETTINGS: Settings = Settings { depth: 1, samples: 4 };
+
+/// Loads a square of this material with an image whose channels have the means 1, 0.4 and 0.2.
+fn square(folder: &Folder, clay: &str) -> Scene {
+    let image = folder.path().join("a.png");
+    let bytes = [255, 51, 102, 255, 153, 0];
+    image::save_buffer(image, &bytes, 2, 1, image::ColorType::Rgb8).unwrap();
+    folder.write(
+        "square.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n\
+         f 1/1/1 2/2/1 3/3/1 4/4/1\n",
+    );
+    let text = yard([8, 6], "constant = [0, 0, 0]", clay, "mesh = \"square.obj\"");
+    Scene::load(&folder.write("scene.toml", text)).unwrap()
+}
+
+/// Warnings about materials of the exports to glTF and pbrt, and the scenes that are read again.
+fn again(folder: &Folder, scene: &Scene) -> [(Vec<String>, Scene); 2] {
+    let [first, second] = ["a.gltf", "a.pbrt"].map(|name| folder.path().join(name));
+    let exports = [gltf::export(scene, &first), pbrt::export(scene, &second, SETTINGS)];
+    let warnings = exports.map(|exported| {
+        exported.write().unwrap();
+        exported.warnings.into_iter().filter(|text| text.starts_with("material")).collect()
+    });
+    let [gltf, pbrt] = warnings;
+    [(gltf, Scene::load(&first).unwrap()), (pbrt, Scene::load(&second).unwrap())]
+}
+
+#[test]
+fn each_difference_is_named_by_the_format_that_forces_it() {
+    let folder = Folder::new();
+    let image = |rest: &str| format!("{{ texture = \"a.png\", {rest} }}");
+    let mixed = format!(
+        "type = \"principled\"\nbase_color = [0.5, 0.5, 0.5]\nroughness = {}\nmetallic = {}",
+        image("channel = \"g\", interpolation = \"nearest\", scale = [2, 2]"),
+        image("factor = 0.9"),
+    );
+    let bumpy = format!(
+        "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]\nnormal = {}",
+        image("scale = [-1, 1]")
+    );
+    let colored = "the colours of its surface or its vertices have no place in a metal";
+    let cases: [(&str, &[&str], &[&str]); 4] = [
+        (
+            "type = \"dielectric\"\nreflectance = [0.5, 1, 1]",
+            &["the factor of its reflected light has no place in glTF's glass"],
+            &["the factors of reflected and transmitted light have no place in pbrt's glass"],
+        ),
+        (
+            "type = \"conductor\"\nalpha = 0.25\neta = [0.2, 0.9, 1.1]\nk = [3.9, 2.4, 2.1]",
+            &["its refractive index becomes", colored],
+            &["pbrt has no colours of vertices"],
+        ),
+        (
+            &mixed,
+            &["its textures of roughness and metal lie on the surface in two ways"],
+            &["pbrt mixes no metal with others", "its dielectric become pbrt's coateddiffuse"],
+        ),
+        (&bumpy, &[], &["its normal map is turned or mirrored"]),
+    ];
+    for (clay, gltf, pbrt) in cases {
+        let mut scene = square(&folder, clay);
+        let count = scene.geometry.positions.len();
+        scene.geometry.tangents = vec![[1.0, 0.0, 0.0, 1.0]; count];
+        if clay.contains("eta =") {
+            scene.geometry.colors = vec![[0.5, 0.5, 1.0, 1.0]; count];
+            scene.materials[0].surface.vertex_color = true;
+        }
+        let [(of_gltf, _), (of_pbrt, read)] = again(&folder, &scene);
+        for (expected, found) in [(gltf, of_gltf), (pbrt, of_pbrt)] {
+            assert_eq!(found.len(), expected.len(), "{found:?}");
+            let is_named = |part: &&&str| found.iter().any(|text| text.contains(**part));
+            assert_eq!(expected.iter().filter(is_named).count(), expected.len(), "{found:?}");
+        }
+        // 0.46 of it is metal: 0.9 times the luminance of the means.
+        let is_coated = matches!(read.materials[0].kind, MaterialKind::Plastic { ior: 1.5, .. });
+        assert_eq!(is_coated, clay == mixed, "{:?}", read.materials[0].kind);
+    }
+}
+
+#[test]
+fn gltf_keeps_frames_of_vertices_and_the_second_coordinates() {
+    let folder = Folder::new();
+    let clay = "type = \"diffuse\"\nreflectance = { texture = \"a.png\" }\n\
+                normal = { texture = \"a.png\" }";
+    let mut scene = square(&folder, clay);
+    let geometry = &mut scene.geometry;
+    geometry.tangents = vec![[0.0, 1.0, 0.0, -1.0]; geometry.positions.len()];
+    geometry.uvs[1] = geometry.uvs[0].iter().map(|&[u, v]| [0.5 * u, v]).collect();
+    scene.materials[0].surface.color.as_mut().unwrap().uv_set = 1;
+    let [(warnings, read), _] = again(&folder, &scene);
+    assert_eq!(warnings, [""; 0]);
+    let surface = &read.materials[0].surface;
+    let sets = [&surface.color, &surface.normal].map(|used| used.as_ref().unwrap().uv_set);
+    assert_eq!(sets, [1, 0]);
+    assert_eq!(read.geometry.tangents, scene.geometry.tangents);
+    let sum = |scene: &Scene| scene.geometry.uvs[1].iter().map(|uv| uv[0]).sum::<f32>();
+    assert_eq!(sum(&read), sum(&scene));
+    let [Texels::Bytes(ours), Texels::Bytes(read)] = [&scene, &read]
+        .map(|scene| &scene.materials[0].surface.color.as_ref().unwrap().texture.texels)
+    else {
+        panic!("bytes")
+    };
+    assert_eq!(ours, read);
+    let text = std::fs::read_to_string(folder.path().join("a.gltf")).unwrap();
+    assert!(!text.contains("alphaMode"), "{text}");
+}
+
+#[test]
+fn gltf_keeps_dielectrics_cutoffs_and_skies() {
+    let folder = Folder::new();
+    let clay = "type = \"principled\"\nbase_color = [0.5, 0.25, 0.125]\nmetallic = 0.25\n\
+                roughness = 0.5\nior = 1.25\nspecular = 0.5\nspecular_color = [1, 0.5, 0.25]\n\
+                opacity = { texture = \"a.png\", channel = \"g\", scale = [2, 1] }\n\
+                opacity_cutoff = 0.25\n[[lamp]]\ntype = \"point\"\nposition = [1, 2, 3]\n\
+                intensity = [4, 5, 6]";
+    square(&folder, clay);
+    let sky = "sky = { width = 32 }";
+    let text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+    let path = folder.write("scene.toml", text.replace("constant = [0, 0, 0]", sky));
+    let ours = Scene::load(&path).unwrap();
+    let path = folder.path().join("a.gltf");
+    gltf::export(&ours, &path).write().unwrap();
+    let environment = Some(folder.path().join("a/environment.exr"));
+    let read = Scene::load_with(&path, &LoadOptions { environment, ..Default::default() }).unwrap();
+    assert_eq!(read.environment.texels, ours.environment.texels);
+    let kind = |scene: &Scene| format!("{:?}", scene.materials[0].kind);
+    assert_eq!(kind(&read), kind(&ours));
+    assert_eq!(read.materials[0].surface.opacity.cutoff, Some(0.25));
+    // A reader may refuse or leave out extensions that are not listed.
+    let text = std::fs::read_to_string(&path).unwrap();
+    let used = text.split_once("\"extensionsUsed\"").unwrap().1.split_once(']').unwrap().0;
+    let used: Vec<_> = used.split('"').filter(|name| name.starts_with("KHR")).collect();
+    let expected = ["lights_punctual", "materials_ior", "materials_specular", "texture_transform"];
+    assert_eq!(used, expected.map(|name| format!("KHR_{name}")));
+}
+
+#[test]
+fn mirrors_and_coats_come_back_from_pbrt() {
+    let folder = Folder::new();
+    let [_, (_, read)] =
+        again(&folder, &square(&folder, "type = \"mirror\"\nreflectance = [1, 1, 1]"));
+    assert!(matches!(read.materials[0].kind, MaterialKind::Mirror { reflectance: Vec3::ONE }));
+    let clay = "type = \"plastic\"\nalpha = 0.25\ndiffuse = { texture = \"a.png\", \
+                linear = true, factor = [0.25, 0.5, 0.5] }";
+    let [_, (_, read)] = again(&folder, &square(&folder, clay));
+    let MaterialKind::Plastic { diffuse, .. } = read.materials[0].kind else { panic!() };
+    let mean = diffuse * Vec3::from(read.materials[0].surface.color.as_ref().unwrap().mean());
+    assert!(mean.abs_diff_eq(Vec3::new(0.25, 0.2, 0.1), 2e-3), "{mean}");
+}
+
+/// A roughness is a number: of colours, the luminance.
+#[test]
+fn coats_for_mitsuba_are_as_light_by_an_image_as_by_its_mean() {
+    let folder = Folder::new();
+    let of = |diffuse: &str, rough: &str| {
+        let clay = format!("type = \"plastic\"\ndiffuse = {diffuse}\n{rough}");
+        let mut scene = square(&folder, &clay);
+        let surface = &mut scene.materials[0].surface;
+        // Scene files have no such image, but those of others do.
+        surface.roughness = surface.normal.take();
+        let warnings = mitsuba::export(&scene, &folder.path().join("a.xml"), SETTINGS).warnings;
+        let rest = warnings.iter().find_map(|text| text.split("its base is ").nth(1)).unwrap();
+        rest.split_once(' ').unwrap().0.parse::<f32>().unwrap()
+    };
+    let mean: f32 = 0.2126 + 0.7152 * 0.4 + 0.0722 * 0.2;
+    let [number, image] =
+        [format!("roughness = {mean}"), "alpha = 1.0\nnormal = { texture = \"a.png\" }".to_owned()]
+            .map(|rough| of("[0.2, 0.2, 0.2]", &rough));
+    assert!(number > 1.05 && (number - image).abs() < 2e-3, "{number} {image}");
+    assert_eq!(of("{ texture = \"a.png\" }", "alpha = 0.25"), 1.0, "its red is 1 already");
+}
