@@ -22,6 +22,10 @@ const SENSOR: &str = r#"<sensor type="perspective"><float name="fov" value="60"/
     <film type="hdrfilm"><integer name="width" value="40"/><integer name="height" value="20"/></film>
     </sensor>"#;
 
+/// Width of 0.3 everywhere.
+const EVEN: &str = r#"<texture name="alpha" type="checkerboard"><float name="color0" value="0.3"/>
+    <float name="color1" value="0.3"/></texture>"#;
+
 /// Direction of the sun of Mitsuba's `sunsky` without parameters, with +Y up.
 const DEFAULT_SUN: Vec3 = Vec3::new(0.051_378_17, 0.720_300_1, -0.691_757_2);
 
@@ -299,11 +303,14 @@ fn models_become_materials() {
     let (pane, _) = material(r#"<bsdf type="thindielectric"/>"#);
     let MaterialKind::ThinDielectric { ior, .. } = pane.kind else { panic!() };
     assert!((ior - 1.50418).abs() < 1e-5, "Mitsuba 3.9.1 says 1.50418: {ior}");
-    let (gone, _) = material(
-        r#"<bsdf type="blendbsdf"><float name="weight" value="0.25"/><bsdf type="diffuse"/>
-        <bsdf type="null"/></bsdf>"#,
-    );
-    assert_eq!(gone.surface.opacity.factor, 0.75);
+    // The weight is that of the second.
+    let (diffuse, null) = (r#"<bsdf type="diffuse"/>"#, r#"<bsdf type="null"/>"#);
+    for (models, opacity) in [([diffuse, null], 0.75), ([null, diffuse], 0.25)] {
+        let weight = r#"<float name="weight" value="0.25"/>"#;
+        let text = format!("<bsdf type=\"blendbsdf\">{weight}{}</bsdf>", models.concat());
+        let (gone, warnings) = material(&text);
+        assert_eq!((gone.surface.opacity.factor, warnings.len()), (opacity, 0));
+    }
     let (nothing, _) = material(r#"<bsdf type="null"/>"#);
     assert_eq!(nothing.surface.opacity.factor, 0.0);
     let (mixed, warnings) = material(
@@ -312,6 +319,11 @@ fn models_become_materials() {
     );
     assert!(matches!(mixed.kind, MaterialKind::Dielectric { .. }));
     assert!(warnings[0].contains("lesser part of `blendbsdf`"), "{warnings:?}");
+    let (alone, warnings) = material(
+        r#"<bsdf type="blendbsdf"><float name="weight" value="0"/><bsdf type="diffuse"/>
+        <bsdf type="dielectric"/></bsdf>"#,
+    );
+    assert!(matches!(alone.kind, MaterialKind::Diffuse { .. }) && warnings.is_empty());
     let (mixed, warnings) = material(
         r#"<bsdf type="mixturebsdf"><string name="weights" value="0.5, 0.25, 0.25"/>
         <bsdf type="diffuse"><rgb name="reflectance" value="0.8"/></bsdf>
@@ -328,17 +340,37 @@ fn models_become_materials() {
     assert!(warnings[0].contains("gloss of `blendbsdf`"), "{warnings:?}");
     let (phong, warnings) = material(
         r#"<bsdf type="phong"><float name="exponent" value="50"/>
-        <rgb name="specularReflectance" value="0.1"/></bsdf>"#,
+        <rgb name="specularReflectance" value="0.1 0.05 0"/></bsdf>"#,
     );
-    let MaterialKind::Principled(Principled { roughness, specular_color, .. }) = phong.kind else {
+    let MaterialKind::Principled(Principled { base_color, roughness, specular_color, .. }) =
+        phong.kind
+    else {
         panic!()
     };
+    // The base has the light that the coat leaves of its brightest channel.
+    assert_close(base_color, Vec3::splat(0.5 / 0.9));
     assert!((roughness.powi(4) - 2.0 / 202.0).abs() < 1e-5, "{roughness}");
     assert!((specular_color.x * 0.04 - 0.1).abs() < 1e-5 && warnings.len() == 1, "{warnings:?}");
+    let ward = r#"<bsdf type="ward"><string name="variant" value="ward-duer"/></bsdf>"#;
+    assert_eq!(material(ward).1.len(), 1);
     let coated = r#"<bsdf type="coating"><bsdf type="diffuse"/></bsdf>"#;
     assert!(matches!(material(coated).0.kind, MaterialKind::Plastic { .. }));
     let plastic = material(r#"<bsdf type="pplastic"><float name="alpha" value="0.2"/></bsdf>"#);
     let MaterialKind::Plastic { alpha: 0.2, .. } = plastic.0.kind else { panic!() };
+    assert!(plastic.1.iter().any(|text| text.contains("polarisation of `pplastic`")));
+    // A width is the same as a number and as an image of that number.
+    let [number, image] = ["<float name=\"alpha\" value=\"0.3\"/>", EVEN].map(|alpha| {
+        let ggx = r#"<string name="distribution" value="ggx"/>"#;
+        let coating = format!("<bsdf type=\"roughcoating\">{ggx}{alpha}{diffuse}</bsdf>");
+        let plastic = format!("<bsdf type=\"roughplastic\">{ggx}{alpha}</bsdf>");
+        [plastic, coating].map(|text| {
+            let material = material(&text).0;
+            let MaterialKind::Plastic { diffuse, alpha, .. } = material.kind else { panic!() };
+            let root = material.surface.roughness.map_or(1.0, |root| root.mean()[0]);
+            Vec3::new(diffuse.x, diffuse.y, alpha * root * root)
+        })
+    });
+    number.into_iter().zip(image).for_each(|(a, b)| assert!(a.abs_diff_eq(b, 1e-3), "{a} {b}"));
     let scene = load("<shape type=\"cube\"/>");
     let MaterialKind::Diffuse { reflectance } = scene.materials[0].kind else { panic!() };
     assert_eq!((reflectance, scene.materials[0].surface.two_sided), (Vec3::splat(0.5), false));
@@ -364,6 +396,15 @@ fn principled_becomes_the_material_of_gltf() {
     assert!((ior - 1.5).abs() < 1e-6 && specular == 1.0, "{ior}");
     assert_eq!(warnings.len(), 1, "{warnings:?}");
     assert!(warnings[0].contains("`sheen`"));
+    // Red is metal by its luminance, 0.2126.
+    let red = ["color0", "color1"].map(|name| format!("<rgb name=\"{name}\" value=\"1 0 0\"/>"));
+    let (found, _) = material(&format!(
+        "<bsdf type=\"principled\"><texture name=\"metallic\" type=\"checkerboard\">{}</texture>\
+         <float name=\"roughness\" value=\"0.3\"/></bsdf>",
+        red.concat()
+    ));
+    let MaterialKind::Principled(Principled { base_color, .. }) = found.kind else { panic!() };
+    assert_close(base_color, Vec3::splat(0.5 * (1.0 + 0.7874 * 0.031)));
     let (glass, warnings) = material(
         r#"<bsdf type="principled"><rgb name="base_color" value="0.25"/>
         <float name="roughness" value="0.5"/><float name="eta" value="1.3"/>
@@ -382,9 +423,17 @@ fn principled_becomes_the_material_of_gltf() {
 fn normal_maps_stand_on_the_tangents_of_mitsuba() {
     let folder = Folder::new();
     write_image(&folder, "bumps.png");
-    for (scale, tangent) in [("1", [1.0, 0.0, 0.0, 1.0]), ("-1", [-1.0, 0.0, 0.0, 1.0])] {
+    // With v turned round, u leads along +y and v along +x: a mirror image.
+    let corners = "vt 0 1\nvt 0 0\nvt 1 1\nf 1/1 2/2 3/3\n";
+    folder.write("turned.obj", format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{corners}"));
+    let turned = r#"obj"><string name="filename" value="turned.obj"/>"#;
+    for (shape, scale, tangent) in [
+        ("rectangle\">", "1", [1.0, 0.0, 0.0, 1.0]),
+        ("rectangle\">", "-1", [-1.0, 0.0, 0.0, 1.0]),
+        (turned, "1", [0.0, 1.0, 0.0, 1.0]),
+    ] {
         let text = format!(
-            "{SENSOR}<shape type=\"rectangle\"><transform name=\"to_world\"><scale x=\"{scale}\"/>\
+            "{SENSOR}<shape type=\"{shape}<transform name=\"to_world\"><scale x=\"{scale}\"/>\
              </transform><bsdf type=\"normalmap\"><texture type=\"bitmap\" name=\"normalmap\">\
              <boolean name=\"raw\" value=\"true\"/>\
              <string name=\"filename\" value=\"bumps.png\"/></texture><bsdf type=\"diffuse\"/>\
@@ -393,31 +442,24 @@ fn normal_maps_stand_on_the_tangents_of_mitsuba() {
         let scene = loaded(&folder.write("a.xml", document(&text)));
         let normal = scene.materials[0].surface.normal.as_ref().unwrap();
         assert_eq!(normal.encoding, Encoding::Linear);
-        assert_eq!(scene.geometry.tangents, [tangent; 4]);
+        assert!(scene.geometry.tangents.iter().all(|found| *found == tangent), "{shape} {scale}");
+        assert_eq!(scene.geometry.uvs[0][0], [0.0; 2]);
     }
 }
-    // Red is metal by its luminance, 0.2126.
-    let red = ["color0", "color1"].map(|name| format!("<rgb name=\"{name}\" value=\"1 0 0\"/>"));
-    let (found, _) = material(&format!(
-        "<bsdf type=\"principled\"><texture name=\"metallic\" type=\"checkerboard\">{}</texture>\
-         <float name=\"roughness\" value=\"0.3\"/></bsdf>",
-        red.concat()
-    ));
-    let MaterialKind::Principled(Principled { base_color, .. }) = found.kind else { panic!() };
-    assert_close(base_color, Vec3::splat(0.5 * (1.0 + 0.7874 * 0.031)));
 
 /// The image lies once on a rectangle of 2 × 2 units.
 #[test]
 fn heights_become_normals_along_their_image() {
     let folder = Folder::new();
     write_image(&folder, "bumps.png");
-    let image = |name: &str| {
+    let scaled = |name: &str, times: f32| {
         format!(
             "<texture type=\"bitmap\" name=\"{name}\"><boolean name=\"raw\" value=\"true\"/>\
              <string name=\"filename\" value=\"bumps.png\"/><string name=\"wrap_mode\" \
-             value=\"clamp\"/></texture>"
+             value=\"clamp\"/><transform name=\"to_uv\"><scale y=\"{times}\"/></transform></texture>"
         )
     };
+    let image = |name: &str| scaled(name, 1.0);
     let of = |bsdf: String| {
         let text = format!("{SENSOR}<shape type=\"rectangle\">{bsdf}</shape>");
         loaded(&folder.write("a.xml", document(&text)))
@@ -430,14 +472,18 @@ fn heights_become_normals_along_their_image() {
     let scene = of(format!("<bsdf type=\"twosided\">{}</bsdf>", bumps(&image("any"), diffuse)));
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
     assert!(scene.geometry.tangents.is_empty());
-    let normal = scene.materials[0].surface.normal.as_ref().unwrap();
     let [red, green, blue, white] = [0.2126_f32, 0.7152, 0.0722, 1.0];
-    for (place, right, up) in
-        [([0.25, 0.25], green - red, red - blue), ([0.75, 0.75], white - blue, green - white)]
-    {
-        let expected = Vec3::new(-right, -up, 1.0).normalize();
-        let found = 2.0 * normal.value(place.into()).truncate() - 1.0;
-        assert!(found.abs_diff_eq(expected, 2e-3), "{found} {expected}");
+    // An image of half the height is twice as steep along it.
+    for times in [1.0, 2.0] {
+        let scene = of(bumps(&scaled("any", times), diffuse));
+        let normal = scene.materials[0].surface.normal.as_ref().unwrap();
+        for (place, right, up) in
+            [([0.25, 0.25], green - red, red - blue), ([0.75, 0.75], white - blue, green - white)]
+        {
+            let expected = Vec3::new(-right, -up * times, 1.0).normalize();
+            let found = 2.0 * normal.value(place.into()).truncate() - 1.0;
+            assert!(found.abs_diff_eq(expected, 2e-3), "{times}: {found} {expected}");
+        }
     }
     // One of two maps counts; a constant height is none.
     let normals = format!("<bsdf type=\"normalmap\">{}{diffuse}</bsdf>", image("normalmap"));
@@ -516,6 +562,32 @@ fn spectra_become_the_colours_of_mitsuba() {
     assert_eq!(intensity(r#"<float name="intensity" value="2"/>"#), Vec3::splat(2.0));
     let warm = intensity(r#"<blackbody name="intensity" temperature="3000K"/>"#);
     assert!(warm.x > 1.5 * warm.y && warm.y > 2.0 * warm.z, "{warm}");
+    let of_type = |kind: &str, rest: &str| {
+        intensity(&format!("<spectrum name=\"intensity\" type=\"{kind}\">{rest}</spectrum>"))
+    };
+    let kelvin = r#"<float name="temperature" value="3000"/><float name="scale" value="2"/>"#;
+    assert_close(of_type("blackbody", kelvin), 2.0 * warm);
+    for name in ["color", "value"] {
+        let rgb = format!("<rgb name=\"{name}\" value=\"1 2 3\"/>");
+        assert_eq!(of_type("rgb", &rgb), Vec3::new(1.0, 2.0, 3.0));
+    }
+    let irregular = |values: &str| {
+        let list = |name: &str, list: &str| format!("<string name=\"{name}\" value=\"{list}\"/>");
+        list("wavelengths", "400 500 600 700") + &list("values", values)
+    };
+    let expected = Vec3::new(2.88172, 2.47458, 1.79734);
+    near(of_type("irregular", &irregular("1 3 2 5")), expected);
+    let spectrum =
+        format!("<spectrum name=\"radiance\" type=\"irregular\">{}</spectrum>", irregular("1"));
+    let message = refusal(&format!("<emitter type=\"constant\">{spectrum}</emitter>"));
+    assert!(message.contains("as many values as wavelengths"), "{message}");
+    let folder = Folder::new();
+    folder.write("lamp.spd", "# nm, W\n400 1\n\n500 3 # blue\n600 2\n700 5\n");
+    let spectrum = r#"<spectrum name="intensity" filename="lamp.spd"/>"#;
+    let text = format!("{SENSOR}<emitter type=\"point\">{spectrum}</emitter>");
+    let scene = loaded(&folder.write("a.xml", document(&text)));
+    let LampKind::Point { intensity: found, .. } = scene.lamps[0].kind else { panic!() };
+    near(found, expected);
     let (paint, _) = material(
         r#"<bsdf type="diffuse"><spectrum name="reflectance" value="400:0.1 500:.3 600:.2 700:.5"/>
         </bsdf>"#,
@@ -606,10 +678,17 @@ fn strands_of_files_are_tubes_in_the_world() {
         assert_eq!(scene.inputs.len(), 2);
     }
     folder.write("a.txt", "0 0 0 0.1\n0 0 x 0.1\n");
-    let text = r#"<shape type="linearcurve"><string name="filename" value="a.txt"/></shape>"#;
-    let path = folder.write("a.xml", document(&format!("{SENSOR}{text}")));
-    let error = Scene::load(&path).unwrap_err().to_string();
-    assert!(error.contains("line 2: expected x y z radius, found `0 0 x 0.1`"), "{error}");
+    folder.write("b.hair", "0 0 0\n0 0 3 0.1\n");
+    for (kind, file, expected) in [
+        ("linearcurve", "a.txt", "line 2: expected x y z radius, found `0 0 x 0.1`"),
+        ("hair", "b.hair", "line 2: expected x y z, found `0 0 3 0.1`"),
+    ] {
+        let text =
+            format!("<shape type=\"{kind}\"><string name=\"filename\" value=\"{file}\"/></shape>");
+        let path = folder.write("a.xml", document(&format!("{SENSOR}{text}")));
+        let error = Scene::load(&path).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
 }
 
 /// Normal of the winding of the first triangle.
@@ -624,6 +703,12 @@ fn sides_are_those_of_mitsuba() {
     let folder = Folder::new();
     folder.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     folder.write("smooth.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n");
+    // Mitsuba weighs the normals of triangles by their angles, here 90° and 45°.
+    folder.write("bent.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 1 1\nf 1 2 3\nf 1 3 4\n");
+    let bent = "<shape type=\"obj\"><string name=\"filename\" value=\"bent.obj\"/></shape>";
+    let scene = loaded(&folder.write("a.xml", document(&format!("{SENSOR}{bent}"))));
+    let corner = scene.geometry.positions.iter().position(|place| *place == [0.0; 3]).unwrap();
+    assert_close(scene.geometry.normals[corner].into(), Vec3::new(1.0, 0.0, 2.0).normalize());
     let light = "<emitter type=\"area\"><rgb name=\"radiance\" value=\"3\"/></emitter>";
     let mirror = "<transform name=\"to_world\"><scale x=\"-1\"/></transform>";
     let flip = "<boolean name=\"flipNormals\" value=\"true\"/>";
@@ -657,6 +742,13 @@ fn sides_are_those_of_mitsuba() {
         let corner = scene.geometry.triangles[0][0] as usize;
         winding(&scene).dot(Vec3::from(scene.geometry.positions[corner]).normalize()) > 0.0
     };
+    let cube = |content: &str| {
+        let scene = load(&format!("<shape type=\"cube\">{content}</shape>"));
+        let centre = Vec3::from(scene.geometry.positions[scene.geometry.triangles[0][0] as usize]);
+        (winding(&scene).dot(centre) > 0.0, scene.geometry.normals[0] == [0.0; 3])
+    };
+    assert_eq!(cube(mirror), (true, false));
+    assert_eq!(cube(&(mirror.to_owned() + flat)), (false, true));
     assert!(sphere("") && !sphere(mirror) && !sphere(flip) && sphere(&(mirror.to_owned() + flip)));
 }
 
@@ -683,19 +775,25 @@ fn round_shapes_stand_where_they_should() {
     let nearest = nearest.unwrap();
     let [u, v] = scene.geometry.uvs[0][nearest];
     assert!(distance(&nearest) < 0.06 && (u - 0.459785).abs() < 0.01 && v == 1.0, "{u}, {v}");
+    // One that leans is as round.
+    let scene = load(r#"<shape type="cylinder"><point name="p1" value="2,3,-6"/></shape>"#);
+    for position in &scene.geometry.positions {
+        let distance = Vec3::from(*position).cross(Vec3::new(2.0, 3.0, -6.0) / 7.0).length();
+        assert!((distance - 1.0).abs() < 1e-5, "{distance}");
+    }
 }
 
 #[test]
 fn instances_repeat_their_group() {
     let scene = load(
-        r#"<shape type="shapegroup" id="pair"><shape type="rectangle"/>
+        r#"<shape type="shapegroup" id="pair"><float name="mass" value="3"/><shape type="rectangle"/>
           <shape type="rectangle"><transform name="to_world"><translate z="1"/></transform></shape>
           </shape>
         <shape type="instance"><ref id="pair"/>
           <transform name="to_world"><translate x="10"/></transform></shape>
         <shape type="instance"><ref id="pair"/></shape>"#,
     );
-    assert_eq!(scene.warnings, [""; 0]);
+    assert!(scene.warnings[0].contains("`mass` of `shapegroup`"), "{:?}", scene.warnings);
     assert_eq!(scene.geometry.triangles.len(), 8);
     assert_eq!(scene.geometry.positions[4], [9.0, -1.0, 1.0]);
     let message = refusal(

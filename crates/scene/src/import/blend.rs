@@ -297,6 +297,25 @@ mod tests {
         // The gloss is that of the one that has gloss, and either may have bumps.
         let roughness = Lobes::of(&kind).unwrap().roughness;
         assert!((roughness - MIN_ALPHA.sqrt()).abs() < 1e-3, "{roughness}");
+        // Neither loses light, nor its other side.
+        let white = Principled { base_color: Vec3::ONE, metallic: 0.0, ..Principled::default() };
+        assert!(light(&MaterialKind::Principled(white)).abs_diff_eq(Vec3::ONE, 1e-5));
+        let one_sided = Surface { two_sided: false, ..Surface::default() };
+        let pair = [(&mirror, &plain), (&diffuse, &one_sided)];
+        assert!(blend_lobes(pair, &quarter).unwrap().1.two_sided);
+        // One image is not two where it lies in two ways.
+        let [one, two] = {
+            let (one, wrap) = (image(), [crate::texture::Wrap::Clamp; 2]);
+            [TextureUse { wrap, ..one.clone() }, one]
+                .map(|color| Surface { color: Some(color), ..Surface::default() })
+        };
+        assert!(blend([(&diffuse, &one), (&diffuse, &two)], &quarter).is_none());
+        // One of two metals is a metal.
+        let (kind, _) = blend_lobes([(&mirror, &plain), (&mirror, &plain)], &quarter).unwrap();
+        let MaterialKind::Principled(Principled { metallic, .. }) = kind else {
+            unreachable!("metal")
+        };
+        assert!((metallic - 1.0).abs() < 1e-4, "{metallic}");
         let bumpy = Surface { normal: Some(image()), ..Surface::default() };
         for pair in
             [[(&mirror, &bumpy), (&diffuse, &plain)], [(&mirror, &plain), (&diffuse, &bumpy)]]
