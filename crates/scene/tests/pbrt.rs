@@ -114,16 +114,28 @@ fn fov_is_that_of_the_shorter_side_and_lenses_scale() {
     let scene = load(window, "");
     assert!((scene.camera.vertical_fov_deg - 2.0 * 0.5_f32.atan().to_degrees()).abs() < 1e-3);
     assert_eq!(warnings(&scene), [DARK]);
+    for side in ["0.5", "1.5"] {
+        let scene = load(&window.replace("0.8888889", side), "");
+        assert!(warnings(&scene)[0].contains("`screenwindow`"), "{:?}", scene.warnings);
+    }
 }
 
 #[test]
 fn the_film_scales_light_and_chooses_the_filter() {
     let head = r#"Film "rgb" "float iso" 200 "string filename" "a.exr" PixelFilter "box" "float xradius" 0.5
         Camera "perspective" "float shutterclose" 0.25"#;
-    let scene = load(head, r#"LightSource "infinite" "rgb L" [1 2 3] "float scale" 2"#);
+    let lights = r#"LightSource "infinite" "rgb L" [1 2 3] "float scale" 2
+        LightSource "point" AreaLightSource "diffuse""#;
+    let scene = load(head, &format!("{lights} {TRIANGLE}"));
+    let LampKind::Point { intensity, .. } = scene.lamps[0].kind else { panic!() };
+    let emission = scene.materials[0].surface.emission.as_ref().unwrap();
+    assert_eq!([intensity, emission.radiance], [Vec3::splat(0.5); 2]);
     assert_eq!(scene.film.filter, Filter::Box);
     assert_eq!((scene.film.width, scene.film.height), (1280, 720));
     assert_eq!(scene.environment.texels[0], Vec3::new(1.0, 2.0, 3.0));
+    // A sky of radiance 1 lights the ground by π.
+    let lit = world(r#"LightSource "infinite" "float illuminance" 6.2831853"#);
+    assert_eq!(lit.environment.texels[0], Vec3::splat(2.0));
     let other = load(r#"PixelFilter "mitchell" Camera "perspective""#, "");
     assert_eq!(other.film.filter, Filter::Gaussian);
     assert!(warnings(&other)[0].contains("PixelFilter `mitchell`"), "{:?}", other.warnings);
@@ -197,7 +209,7 @@ fn quadrics_and_patches_face_outward() {
         ("\"sphere\" \"float radius\" 2", 16.0 * std::f32::consts::PI),
         ("\"cylinder\" \"float zmin\" 0 \"float zmax\" 3", 6.0 * std::f32::consts::PI),
         ("\"disk\" \"float height\" 1 \"float innerradius\" 0.5", 0.75 * std::f32::consts::PI),
-        ("\"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0]", 4.0),
+        ("\"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0] \"integer faceIndices\" 3", 4.0),
         (
             r#""loopsubdiv" "integer levels" 1 "point3 P" [1 0 0 0 1 0 0 0 1]
             "integer indices" [0 1 2]"#,
@@ -205,6 +217,7 @@ fn quadrics_and_patches_face_outward() {
         ),
     ] {
         let scene = world(&format!("Shape {shape}"));
+        assert_eq!(warnings(&scene), [DARK]);
         let positions = positions(&scene);
         let mut sum = 0.0;
         for (index, triangle) in scene.geometry.triangles.iter().enumerate() {
@@ -272,12 +285,14 @@ fn materials_are_the_nearest() {
     };
     close(diffuse, [0.1, 0.2, 0.3].map(albedo_below_coat(1.3)));
     assert_eq!((alpha, ior), (0.5, 1.3));
-    let MaterialKind::Plastic { alpha, .. } =
-        material(r#""coateddiffuse" "bool remaproughness" false "float roughness" 0.25"#).kind
-    else {
-        panic!()
-    };
-    assert_eq!(alpha, 0.25);
+    for (roughness, expected) in [(0.25, 0.25), (4.0, 1.0)] {
+        let plain = r#""coateddiffuse" "bool remaproughness" false "float roughness""#;
+        let MaterialKind::Plastic { alpha, .. } = material(&format!("{plain} {roughness}")).kind
+        else {
+            panic!()
+        };
+        assert_eq!(alpha, expected);
+    }
     let MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } =
         material(r#""conductor" "rgb eta" [1.6 0.8 0.5] "spectrum k" "metal-Ag-k""#).kind
     else {
@@ -288,12 +303,12 @@ fn materials_are_the_nearest() {
     assert_eq!(alpha, 1e-3);
     // η = 1 and k = 2√r/√(1 − r) reflect r at normal incidence.
     let MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { eta, k }, .. } =
-        material(r#""conductor" "rgb reflectance" [0.5 0.8 0]"#).kind
+        material(r#""conductor" "rgb reflectance" [0.5 1 0]"#).kind
     else {
         panic!()
     };
     close(eta, [1.0; 3]);
-    close(k * k / (k * k + 4.0), [0.5, 0.8, 0.0]);
+    close(k * k / (k * k + 4.0), [0.5, 0.9999, 0.0]);
     let MaterialKind::Dielectric { ior, alpha, .. } =
         material(r#""dielectric" "spectrum eta" "glass-BK7""#).kind
     else {
@@ -359,9 +374,11 @@ fn mixtures_and_surfaces_that_are_not_there() {
         warnings(&scene),
         ["ignored area lights without a surface (line 7): left out, as in pbrt", DARK]
     );
-    let alpha = world(&format!("{TRIANGLE} \"float alpha\" 0.5 {TRIANGLE}"));
-    assert_eq!(alpha.materials.len(), 2);
-    assert_eq!(alpha.materials[0].surface.opacity.factor, 0.5);
+    for (alpha, expected) in [(0.5, 0.5), (1.5, 1.0)] {
+        let alpha = world(&format!("{TRIANGLE} \"float alpha\" {alpha} {TRIANGLE}"));
+        assert_eq!(alpha.materials.len(), 2);
+        assert_eq!(alpha.materials[0].surface.opacity.factor, expected);
+    }
     let attribute = world(&format!("Attribute \"shape\" \"float alpha\" 0.5 {TRIANGLE}"));
     assert_eq!(attribute.materials[0].surface.opacity.factor, 0.5);
 }
@@ -512,6 +529,13 @@ fn numbers_are_opacity_or_colours_and_roughness_is_mapped() {
     let map = normal.materials[0].surface.normal.clone().unwrap();
     assert_eq!((map.encoding, map.image_from_uv[1]), (Encoding::Linear, [0.0, -1.0, 1.0]));
     assert_eq!(normal.geometry.tangents.len(), 3);
+    // Along u, which falls with x of the shape; the bitangent is the outer normal × the tangent.
+    for (scale, x) in [(1, -1.0), (-1, 1.0)] {
+        let mesh = r#""point3 P" [0 0 0 1 0 0 0 1 0] "point2 uv" [1 1 0 1 1 2]"#;
+        let scaled = format!("Scale {scale} 1 1 Shape \"trianglemesh\" {mesh}");
+        let normal = textured("", &format!("\"diffuse\" \"string normalmap\" \"a.png\" {scaled}"));
+        assert_eq!(normal.geometry.tangents[0], [x, 0.0, 0.0, 1.0]);
+    }
     // Heights of two texels, the left one higher: those of the channel of opacity.
     let clamped = format!("{float} \"string wrap\" \"clamp\"");
     let bumpy = textured(&clamped, r#""diffuse" "texture displacement" "f""#);
@@ -642,6 +666,18 @@ fn square_maps_lie_where_pbrt_shows_them() {
         assert!(scene.environment.radiance(turn * Vec3::NEG_Z).x < 1e-2);
         assert!((scene.environment.radiance(Vec3::X).z - 3.0).abs() < 1e-3);
     }
+    let found = {
+        let negative = format!(
+            "{MIRRORED} WorldBegin {}",
+            r#"LightSource "infinite" "rgb L" [0 2 0]
+            LightSource "infinite" "string filename" "sky.pfm" "float scale" -1"#
+        );
+        Scene::load(&folder.write("room.pbrt", negative)).unwrap_err().to_string()
+    };
+    assert!(found.contains("sky.pfm: radiance that is not finite or negative"), "{found}");
+    folder.write("sky.pfm", [&b"PF\n2 1\n-1\n"[..], &[0; 24]].concat());
+    let found = Scene::load(&folder.path().join("room.pbrt")).unwrap_err().to_string();
+    assert!(found.contains("expected a square equal-area map") && found.contains("2×1"), "{found}");
 }
 
 #[test]
@@ -721,6 +757,7 @@ fn bad_text_is_one_error_with_file_line_and_column() {
         ("Shape \"sphere\" \"float radius", "room.pbrt:3:16: expected a closing quote"),
         ("Shape \"sphere\" \"colour x\" 1", "unknown type `colour`"),
         ("Shape \"sphere\" \"float x\" 1 \"float x\" 2", "parameter `x` is given twice"),
+        ("Shape \"trianglemesh\"", "expected vertex positions `P`"),
         ("Shape \"blob\"", "room.pbrt:3:1: Shape \"blob\": unknown shape `blob`"),
         (
             "Shape \"trianglemesh\" \"point3 P\" [0 0]",
@@ -748,6 +785,11 @@ fn bad_text_is_one_error_with_file_line_and_column() {
         ("LightSource \"infinite\" \"blackbody L\" -1", "expected one temperature"),
         ("LightSource \"infinite\" \"spectrum L\" \"x\"", "unknown spectrum `x`"),
         ("Shape \"sphere\" \"float radius\" 1e999", "expected a number"),
+        (
+            "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"a.png\" \"string encoding\" \
+             \"gamma -2\" Shape \"sphere\" \"texture alpha\" \"t\"",
+            "expected the encoding sRGB, linear or gamma with a number, found `gamma -2`",
+        ),
     ] {
         let found = message(text);
         assert!(found.contains(expected), "{text}: {found}");
@@ -826,6 +868,13 @@ fn files_that_would_exhaust_the_program_are_refused_soon() {
 fn files_elsewhere_and_pipes_are_no_input() {
     let folder = Folder::new();
     folder.write("metal.spd", "400 1 700 2");
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty \
+               float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+               0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    folder.write("mesh.ply", ply);
+    let text = format!("{MIRRORED} WorldBegin Shape \"plymesh\" \"string filename\" \"mesh.ply\"");
+    let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
+    assert!(scene.inputs.iter().any(|path| path.ends_with("mesh.ply")), "{:?}", scene.inputs);
     let use_of = |name: &str| {
         [
             format!("Shape \"plymesh\" \"string filename\" \"{name}.ply\""),
@@ -901,7 +950,11 @@ fn everything_left_out_is_named_once() {
         Shape "curve" "point3 P" [0 0 0 1 1 1 2 2 2 3 3 3]
         Material "coateddiffuse" "float uroughness" 0.1 "float vroughness" 0.2 "rgb albedo" [1 0 0]
         Scale 1 0 1 {TRIANGLE}
-        Material "hair" {TRIANGLE}"#
+        Material "hair" {TRIANGLE}
+        Identity Texture "m" "spectrum" "marble" Texture "d" "spectrum" "directionmix"
+        Material "diffuse" "texture reflectance" "m" {TRIANGLE} "vector S" [1 0 0 1 0 0 1 0 0]
+        Material "diffuse" "texture reflectance" "d" {TRIANGLE}
+        ObjectBegin "lit" AreaLightSource "diffuse" {TRIANGLE} ObjectEnd ObjectInstance "lit""#
     );
     let scene = load(head, &world);
     assert_eq!(scene.asked.depth, Some(7));
@@ -909,7 +962,7 @@ fn everything_left_out_is_named_once() {
         "ignored Option `seed` (line 1)",
         "ignored ColorSpace `rec2020` (line 2)",
         "ignored `ActiveTransform`, `TransformTimes` (line 7): nothing moves",
-        "ignored other media (3, first in line 8)",
+        "ignored other media (5, first in line 8)",
         "ignored sensor `canon_eos_100d` (line 4)",
         "ignored `cropwindow` of the film (line 4)",
         "ignored parameter `halffov` of Camera \"perspective\" (line 5)",
@@ -920,6 +973,10 @@ fn everything_left_out_is_named_once() {
         "ignored `uroughness` other than `vroughness` (line 13): their mean α, or the texture",
         "ignored shapes whose transformation flattens space (2, first in line 14): left out",
         "ignored parameters of `hair` (line 15): rendered as diffuse of 0.5",
+        "ignored marble (line 16)",
+        "ignored directionmix (line 16)",
+        "ignored tangents `S` of meshes (line 17)",
+        "ignored area lights in objects (line 19): dark, as in pbrt",
         DARK,
     ];
     let found = warnings(&scene);

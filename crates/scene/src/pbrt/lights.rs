@@ -289,6 +289,10 @@ mod tests {
     #[test]
     fn a_white_map_gives_an_illuminance_of_pi() {
         assert!((upper_illuminance(&[Vec3::ONE; 64 * 64], 64) - PI).abs() < 0.01);
+        // So does either half of it give half of that.
+        let left: Vec<_> =
+            (0..64 * 64).map(|at| if at % 64 < 32 { Vec3::ONE } else { Vec3::ZERO }).collect();
+        assert!((upper_illuminance(&left, 64) - 0.5 * PI).abs() < 0.01);
         // Above the horizon is inside the diamond.
         let uv = square_from_direction(Vec3::new(0.6, 0.0, 0.8));
         assert!((uv.x - 0.5).abs() + (uv.y - 0.5).abs() < 0.5);
