@@ -18,7 +18,7 @@ const SETTINGS: Settings = Settings { depth: 1, samples: 4 };
 /// Loads a square of this material with an image whose channels have the means 1, 0.4 and 0.2.
 fn square(folder: &Folder, clay: &str) -> Scene {
     let image = folder.path().join("a.png");
-    let bytes = [255, 51, 102, 255, 153, 0];
+    let bytes = [255, 116, 102, 255, 88, 0];
     image::save_buffer(image, &bytes, 2, 1, image::ColorType::Rgb8).unwrap();
     folder.write(
         "square.obj",

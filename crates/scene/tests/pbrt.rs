@@ -286,8 +286,8 @@ fn materials_are_the_nearest() {
     close(diffuse, [0.1, 0.2, 0.3].map(albedo_below_coat(1.3)));
     assert_eq!((alpha, ior), (0.5, 1.3));
     for (roughness, expected) in [(0.25, 0.25), (4.0, 1.0)] {
-        let plain = r#""coateddiffuse" "bool remaproughness" false "float roughness""#;
-        let MaterialKind::Plastic { alpha, .. } = material(&format!("{plain} {roughness}")).kind
+        let plain = r#""dielectric" "bool remaproughness" false "float roughness""#;
+        let MaterialKind::Dielectric { alpha, .. } = material(&format!("{plain} {roughness}")).kind
         else {
             panic!()
         };
@@ -928,6 +928,12 @@ fn mixtures_of_diffuse_materials_are_diffuse() {
     let MaterialKind::Diffuse { reflectance } = scene.materials[0].kind else { panic!() };
     assert_eq!(reflectance, Vec3::new(0.75, 0.0, 0.25));
     assert_eq!(warnings(&scene), [DARK]);
+    // Nothing is lost of a mixture that is the first alone.
+    let alone = r#"MakeNamedMaterial "red" "string type" "diffuse"
+        MakeNamedMaterial "glass" "string type" "dielectric"
+        MakeNamedMaterial "alone" "string type" "mix" "string materials" ["red" "glass"]
+        "float amount" 0 NamedMaterial "alone""#;
+    assert_eq!(warnings(&world(&format!("{alone} {TRIANGLE}"))), [DARK]);
     assert!(matches!(
         material(r#""conductor" "rgb reflectance" [1 1 1]"#).kind,
         MaterialKind::Mirror { reflectance: Vec3::ONE }

@@ -10,7 +10,7 @@ use std::{
 
 use roxmltree::ParsingOptions;
 
-use super::text::{self, Lines, snake_case};
+use super::text::{Lines, snake_case};
 use crate::{
     beside::{Folder, in_another_case},
     error::{Error, Result},
@@ -223,7 +223,6 @@ impl Builder {
         let file = self.document.files.len();
         self.document.files.push(path.to_path_buf());
         self.open.push(path.to_path_buf());
-        text::check_nesting(path, &xml_text, MAX_DEPTH)?;
         // A document type could define entities, which the format has no use for.
         let options =
             ParsingOptions { nodes_limit: 8 * MAX_ELEMENTS as u32, ..ParsingOptions::default() };
