@@ -100,8 +100,7 @@ macro_rules! samplers {
             $parameters:ident;)*
     }) => {
         /// Samplers of directions at a hit. All trace one shadow ray per direction, and all are
-        /// unbiased except with [`Elevation::Metropolis`](product::Elevation::Metropolis) or another
-        /// [`Reading`](product::Reading) than `mixture`.
+        /// unbiased except with [`Elevation::Metropolis`](product::Elevation::Metropolis).
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
         pub enum Sampler {
             $($(#[$basic_doc])* #[value(name = $basic_name)] $basic,)*
