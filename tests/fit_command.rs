@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::support::command::{Folder, Run, pfm, program};
 
-/// Encodes a grey map of 16 × 8 texels, one of them bright.
+/// Encodes a grey map of 16 × 8 texels, one of them bright: the seventh of the fourth row from above.
 fn sky() -> Vec<u8> {
     let mut texels = [[0.5; 3]; 16 * 8];
     texels[70] = [50.0; 3];
@@ -26,6 +26,10 @@ fn maps_are_fitted_pictured_and_described() {
     assert!(value["errors"]["chi_squared"].as_f64().unwrap() < 0.5, "{value}");
     assert!(value["seconds"].as_f64().unwrap() > 0.0);
     assert_eq!(folder.files(), ["sky.fit", "sky.pfm", "sky.png"]);
+    // The map is on the left, 512 pixels wide.
+    let picture = image::open(folder.path().join("sky.png")).unwrap().into_rgb8();
+    let shown = [[208, 112], [304, 112], [208, 144]].map(|[x, y]| picture[(x, y)].0[1]);
+    assert!(shown[0] == 255 && shown[1].max(shown[2]) < 100, "{shown:?}");
 
     let parts = ["environment fit of sky.pfm", "6 of 6", "chi squared", "energy captured"];
     folder.run(&["info", "sky.fit"]).assert_output(&parts);

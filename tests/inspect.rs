@@ -147,34 +147,32 @@ fn info_reads_environment_maps() {
 
 #[test]
 fn info_judges_measured_brdfs() {
-    // A Lambertian surface of albedo 0.5 at every wavelength.
+    // Lambertian surfaces, of one albedo at every wavelength.
     let folder = Folder::new();
-    let wavelengths: Vec<String> = (0..31).map(|step| (400 + 10 * step).to_string()).collect();
-    let mut text = format!("# grey in many directions\n31 {}\n", wavelengths.join(" "));
-    for incident in [10, 40, 70] {
-        for outgoing in [10, 40, 70] {
-            for azimuth in [0, 60, 120, 180] {
-                let radians = |degrees: i32| f64::from(degrees).to_radians();
-                let value = format!(" {}", 0.5 / std::f64::consts::PI);
-                text += &format!(
-                    "{} 0 {} {}{}\n",
-                    radians(incident),
-                    radians(outgoing),
-                    radians(azimuth),
-                    value.repeat(31)
-                );
+    let report = |albedo: f64| {
+        let wavelengths: Vec<String> = (0..31).map(|step| (400 + 10 * step).to_string()).collect();
+        let value = format!(" {}", albedo / std::f64::consts::PI).repeat(31);
+        let mut text = format!("# grey in many directions\n31 {}\n", wavelengths.join(" "));
+        for incident in [10.0_f64, 40.0, 70.0].map(f64::to_radians) {
+            for outgoing in [10.0_f64, 40.0, 70.0].map(f64::to_radians) {
+                for azimuth in [0.0_f64, 60.0, 120.0, 180.0].map(f64::to_radians) {
+                    text += &format!("{incident} 0 {outgoing} {azimuth}{value}\n");
+                }
             }
         }
-    }
-    folder.write("grey.brdf", text);
-    let run = folder.run(&["info", "grey.brdf", "--json"]);
-    run.assert(0, &[]);
-    let report = json(&run.output);
+        folder.write("grey.brdf", text);
+        let run = folder.run(&["info", "grey.brdf", "--json"]);
+        run.assert(0, &[]);
+        json(&run.output)
+    };
+    let grey = report(0.5);
     // Equal energy is not quite the white of Rec.709, but has its luminance.
-    let albedo = |channel: usize| report["sanity"]["albedo"][1][channel].as_f64().unwrap();
+    let albedo = |channel: usize| grey["sanity"]["albedo"][1][channel].as_f64().unwrap();
     let luminance = 0.2126 * albedo(0) + 0.7152 * albedo(1) + 0.0722 * albedo(2);
     assert!((luminance - 0.5).abs() < 0.02, "{luminance}");
-    assert!(report["sanity"]["largest_reciprocity_error"].as_f64().unwrap() < 1e-3);
+    assert!(grey["sanity"]["largest_reciprocity_error"].as_f64().unwrap() < 1e-3);
+    let black = report(0.0)["warnings"].to_string();
+    assert!(black.contains("black at every pair of directions"), "{black}");
 }
 
 #[test]

@@ -576,6 +576,12 @@ fn references_can_be_given() {
     let [single_error, both] = [single, &own].map(|of| of["mean_standard_error"].as_f64().unwrap());
     assert!((both * 2_f64.sqrt() / single_error - 1.0).abs() < 0.05, "{both} {single_error}");
     assert!(single["relmse"].is_null());
+    let image = Image::read_exr(&folder.path().join("a.exr")).unwrap();
+    let variances = ["R", "G", "B"].map(|channel| &image.channels[&format!("Variance.{channel}")]);
+    let mean = variances.into_iter().flatten().map(|value| f64::from(*value)).sum::<f64>()
+        / (3.0 * 24.0 * 16.0);
+    let found = single["mse"].as_f64().unwrap();
+    assert!((found / mean - 1.0).abs() < 1e-6, "{found} {mean}");
 
     // Take the references of another study.
     let more = words("study yard.toml --samplers=ris --spp=2 --reference=report -o more");
@@ -660,7 +666,7 @@ fn a_sampler_below_the_references_noise_is_not_judged() {
     assert!(summary["rmse_ratio"].is_null() && summary["efficiency"].is_null());
     let page = fs::read_to_string(folder.path().join("report/index.html")).unwrap();
     check_page(&page);
-    assert!(page.contains("not judged") && page.contains("--reference-spp"));
+    assert!(page.contains("Figures that are not judged") && page.contains("--reference-spp"));
 }
 
 #[test]

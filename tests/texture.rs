@@ -389,6 +389,17 @@ fn geometry(numbers: &mut Random) -> Geometry {
     geometry
 }
 
+#[test]
+fn colours_of_vertices_end_at_black_and_white() {
+    let words = |color: [f32; 4]| {
+        let mut geometry = geometry(&mut Random(7));
+        geometry.colors.fill(color);
+        let accel = Accel::build(&geometry, 1 << 20).unwrap();
+        TriangleAttributes::new(&geometry, &accel, ATTRIBUTE_COLOR).words
+    };
+    assert_eq!(words([2.0, -1.0, 0.5, 1.0]), words([1.0, 0.0, 0.5, 1.0]));
+}
+
 /// Twin of `TextureQuery` in `glsl/test/texture.comp`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

@@ -155,6 +155,13 @@ impl Grid {
         ((z * height + y) * width + x) * FACES + face
     }
 
+    /// Inverse of [`Self::index_of`].
+    fn cell_of(&self, index: usize) -> (UVec3, usize) {
+        let [width, height, _] = self.size;
+        let cell = (index / FACES) as u32;
+        (UVec3::new(cell % width, cell / width % height, cell / width / height), index % FACES)
+    }
+
     /// Index of the cell and face of a place: twin of `lamp_list`.
     fn index(&self, place: &Place) -> usize {
         self.index_of(self.cell(place.position), cube_face(place.normal))
@@ -226,8 +233,7 @@ impl LampCells {
         let mut found = vec![0; FACES * (width * height * depth) as usize];
         let numbers: BTreeMap<usize, usize> = coarse.keys().copied().zip(fine.len()..).collect();
         for (index, list) in found.iter_mut().enumerate() {
-            let (cell, face) = ((index / FACES) as u32, index % FACES);
-            let cell = UVec3::new(cell % width, cell / width % height, cell / width / height);
+            let (cell, face) = grid.cell_of(index);
             if let Some(number) = numbers.get(&coarse_index(cell, face)) {
                 *list = first_of(*number);
             }
@@ -528,4 +534,21 @@ fn list_of(
     let none = LampEntry { before: u32::MAX, first: u32::MAX, ..LampEntry::default() };
     entries.resize(length, none);
     entries
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cell_and_face_has_its_own_index() {
+        let grid = Grid { size: [2, 3, 4], ..Grid::default() };
+        let found: Vec<_> = (0..2 * 3 * 4 * FACES).map(|index| grid.cell_of(index)).collect();
+        let indices = found.iter().map(|(cell, face)| grid.index_of(*cell, *face));
+        assert!(indices.eq(0..found.len()), "{found:?}");
+        assert_eq!(found.last(), Some(&(UVec3::new(1, 2, 3), FACES - 1)));
+        for (normal, face) in [([0.3, 0.1, 0.2], 0), ([0.1, -0.3, 0.2], 3), ([0.1, 0.2, 0.3], 4)] {
+            assert_eq!(cube_face(normal.into()), face, "{normal:?}");
+        }
+    }
 }

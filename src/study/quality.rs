@@ -307,6 +307,7 @@ mod tests {
         let [coarse, fine, trimmed_coarse, _] = &all[..] else { unreachable!() };
         assert_eq!((coarse.threshold, fine.threshold), (0.1, 0.02));
         assert_near(coarse.seconds, 8.0);
+        assert_near(times(&[runs[0].clone(), runs[2].clone()], 0.006)[0].seconds, 6.0);
         assert_near(coarse.fastest, 4.0);
         assert_near(coarse.slowest, 12.0);
         assert_eq!(

@@ -401,6 +401,10 @@ mod tests {
         let svg = scatter("t", "x", "y", &series, &[("thesis <closed>", [40.0, 50.0])]);
         assert!(svg.contains("class=\"range\"") && svg.contains("class=\"bar\""));
         assert!(svg.contains("thesis &lt;closed&gt;"));
+        // Ten of the 53 percent that the drawing shows, and a pixel about them.
+        let expected = (HEIGHT - BOTTOM - TOP) * 10.0 / 53.0 + 2.0;
+        let heights = attribute(&svg, "height");
+        assert!(heights.iter().any(|height| (height - expected).abs() < 0.1), "{heights:?}");
     }
 
     #[test]
