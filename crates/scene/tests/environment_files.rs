@@ -324,10 +324,17 @@ fn procedural_maps_are_lit_as_their_names_say() {
     assert!(brightest > 1e4, "{brightest}");
     // Away from the sun, the glow about it is gone.
     let opposite = Vec3::new(-50_f32.to_radians().sin(), 3e-3, 50_f32.to_radians().cos());
-    for (direction, expected) in [(Vec3::Y, parameters.zenith), (opposite, parameters.horizon)] {
+    let SkyParameters { zenith, horizon, ground, .. } = parameters;
+    for (direction, expected) in [(Vec3::Y, zenith), (opposite, horizon), (-Vec3::Y, ground)] {
         let found = sky.radiance(direction);
         assert!(found.abs_diff_eq(expected.into(), 0.03), "{found} instead of {expected:?}");
     }
+    // The glow falls to 1/e of its 1.5 in 0.17 rad.
+    let even = SkyParameters { zenith: [1.0; 3], horizon: [1.0; 3], ..parameters };
+    let even =
+        EnvironmentMap::sky(&SkyParameters { sun_elevation_deg: 90.0, ..even }, 1.0).unwrap();
+    let found = even.radiance(Vec3::new(0.17_f32.sin(), 0.17_f32.cos(), 0.0)).x;
+    assert!((found - 1.0 - 1.5 * (-1_f32).exp()).abs() < 0.01, "{found}");
 
     let court = EnvironmentMap::court(&CourtParameters::default(), 1.0).unwrap();
     assert_eq!((court.width, court.height), (1024, 512));
@@ -374,6 +381,7 @@ fn parameters_out_of_range_are_refused_by_name() {
         (sky("sun_radiance = [inf, 1, 1]"), "sun_radiance"),
         (sky("moon = 1"), "unknown field `moon`"),
         (daylight("turbidity = 0"), "turbidity = 0; expected 1…10"),
+        (daylight("hour = 25"), "hour = 25; expected 0…24"),
         (daylight("date = [2026, 13, 1]"), "date: month = 13; expected 1…12"),
         (daylight("date = [2024, 2, 30]"), "date: day = 30; expected 1…29"),
         (daylight("date = [2025, 12, 32]"), "date: day = 32; expected 1…31"),
@@ -392,4 +400,5 @@ fn parameters_out_of_range_are_refused_by_name() {
     }
     assert!(EnvironmentMap::constant(Vec3::new(1.0, -1.0, 0.0), 1.0).is_err());
     assert!(EnvironmentMap::constant(Vec3::ONE, f32::NAN).is_err());
+    assert!(EnvironmentMap::sky(&SkyParameters::default(), f32::MAX).is_err());
 }

@@ -617,6 +617,12 @@ fn mtl_materials_become_surfaces() {
     }
     let debug = |keys: &str| format!("{:?}", kind(keys));
     assert_eq!(debug("Ks 0.5\nNs -3"), debug("Ks 0.5"), "no exponent");
+    let metal = kind("Kd 0.5\nPm 0.25");
+    assert!(
+        matches!(metal, MaterialKind::Principled(Principled { metallic: 0.25, .. })),
+        "{metal:?}"
+    );
+    assert!(mtl_material(&folder, "Ke 0 0 0").0.surface.emission.is_none());
     let deep = image::ImageBuffer::from_pixel(1, 1, image::Rgba([9000_u16, 9000, 9000, 30_000]));
     deep.save(folder.path().join("deep.png")).unwrap();
     let surface = mtl_material(&folder, "map_Kd deep.png").0.surface;

@@ -413,6 +413,12 @@ fn numbers_that_cannot_be_rendered_are_refused_by_name() {
         "ior: expected a number from 1 to 4, found 5",
     );
     case(
+        &material(
+            "type = \"principled\"\nbase_color = [0, 0, 0]\nmetallic = 0\nroughness = 1\nspecular = 2",
+        ),
+        "specular: expected a number from 0 to 1, found 2",
+    );
+    case(
         &material("type = \"conductor\"\nalpha = 0.1"),
         "a conductor needs either reflectance, or eta and k",
     );
@@ -746,7 +752,8 @@ fn lamps_and_objects_name_groups_of_lights() {
         warnings[0].ends_with("ignored light_group: the object emits no light"),
         "{warnings:?}"
     );
-    for (name, text) in [("", lamp), ("a.b", &object("light_group = \"key\""))] {
+    let include = "[[include]]\nfile = \"none.obj\"\nlight_group = \"key\"\n";
+    for (name, text) in [("", lamp), ("a.b", &object("light_group = \"key\"")), ("c.d", include)] {
         let message = message(&folder, &format!("{dark}{}", text.replace("key", name)));
         let expected = format!(
             "light_group: expected up to 63 letters, digits, spaces, `_` and `-`, \
@@ -937,6 +944,11 @@ fn the_hash_follows_the_picture_and_not_the_text() {
     ] {
         assert_ne!(original, hash(&with_box("").replace(from, to)), "{from} → {to}");
     }
+    let mesh = |faces: &str| {
+        folder.write("a.ply", ascii_ply(faces));
+        hash(&format!("{HEAD}[[object]]\nmesh = \"a.ply\"\nmaterial = \"grey\"\n"))
+    };
+    assert_ne!(mesh("3 0 1 2"), mesh("3 1 2 3"));
 }
 
 #[test]
@@ -1031,6 +1043,8 @@ fn ply_reads_all_three_encodings() {
     assert!(ascii.normals.is_empty());
     assert_eq!(ascii.triangles[0], [0, 1, 2]);
     assert_eq!(ascii.triangles.len(), 3);
+    let squares = read(&folder, "squares.ply", ascii_ply("4 0 1 2 3\n4 3 2 1 0"));
+    assert_eq!(squares.triangles.len(), 4);
     let windows = ascii_ply("3 0 1 2").replace('\n', "\r\n");
     assert_eq!(read(&folder, "windows.ply", windows).triangles, [[0, 1, 2]]);
 }
@@ -1234,6 +1248,7 @@ fn gltf_reads_nodes_from_every_kind_of_buffer() {
         };
         assert_eq!(*base_color, Vec3::new(0.1, 0.6, 0.2));
         assert!(warnings[0].ends_with("ignored points and lines (mesh 0)"), "{warnings:?}");
+        assert_eq!(mesh.side_files.len(), usize::from(name == "beside.gltf"), "{name}");
     }
     // The scene that is not rendered is named.
     let scenes = r#"[{"name": "night", "nodes": [0]}, {"nodes": [0]}]"#;

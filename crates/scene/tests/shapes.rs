@@ -269,10 +269,14 @@ fn grids_are_sheets_of_their_thickness() {
     assert_eq!(check_closed(&mesh).1, 2);
     let highest = mesh.positions.iter().map(|position| position[1]).fold(0.0, f32::max);
     assert!((highest - 0.052).abs() < 1e-3, "{highest}");
-    // The steepest slope of the wave is 2π · 0.05 / 0.25, along x.
-    let steepest = mesh.normals.iter().filter(|normal| normal[1] > 0.1).map(|normal| normal[0]);
-    let expected = (0.4 * PI as f32).atan().sin();
-    assert!((steepest.fold(0.0, f32::max) - expected).abs() < 1e-2);
+    // The steepest slope of the wave is 2π · 0.05 / 0.25, along x or z.
+    let across =
+        folded.replace("[200, 4]", "[4, 200]").replace("0.25 }", "0.25, direction_deg = 90 }");
+    for (mesh, axis) in [(&mesh, 0), (&shape("grid", &across).unwrap(), 2)] {
+        let top = mesh.normals.iter().filter(|normal| normal[1] > 0.1);
+        let steepest = top.map(|normal| normal[axis]).fold(0.0, f32::max);
+        assert!((steepest - (0.4 * PI as f32).atan().sin()).abs() < 1e-2, "{axis}: {steepest}");
+    }
     let hill = "size = [1.0, 1.0]\nthickness = 0.002\nheights = [[0,0,0],[0,0.3,0],[0,0,0]]";
     let mesh = shape("grid", hill).unwrap();
     assert_eq!(check_closed(&mesh).1, 2);
@@ -307,6 +311,8 @@ fn impossible_parameters_name_the_key_and_the_value() {
     assert!(message(fat).contains("tube_radius: expected less than radius (1), found 1"));
     let flat = shape("lathe", "profile = [[0, 0], [0, 1]]");
     assert!(message(flat).contains("off the axis"));
+    let lost = shape("lathe", "profile = [[1, nan], [1, 1]]");
+    assert!(message(lost).ends_with("profile: expected finite numbers, found NaN"));
     let inside_out = shape("lathe", "profile = [[-1, 0], [1, 1]]");
     assert!(message(inside_out).contains("radii of 0 or more, found -1"));
     let bow_tie = shape("extrude", "depth = 1\noutline = [[0,0],[1,1],[1,0],[0,1]]");

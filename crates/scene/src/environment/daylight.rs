@@ -218,5 +218,10 @@ mod tests {
         let found: Vec3 = (0..height).map(row).sum();
         assert!(found.abs_diff_eq(light.sun_irradiance(), 1e-3), "{found}");
         assert!(daylight(-Vec3::Z, 3.0).map(1.0).is_black());
+        let sky = |sky_scale: f32| {
+            let light = Daylight { sky_scale, sun_scale: 0.0, ..daylight(Vec3::Z, 3.0) };
+            light.map(1.0).texels.iter().sum::<Vec3>()
+        };
+        assert!((sky(2.0) / sky(0.5)).abs_diff_eq(Vec3::splat(4.0), 1e-3));
     }
 }
