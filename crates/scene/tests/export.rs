@@ -3,13 +3,13 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests may panic")]
 
 use fenestra_scene::{
-    Scene,
+    Geometry, Scene,
     export::{Settings, gltf, mitsuba, pbrt},
     load::LoadOptions,
     material::MaterialKind,
-    texture::Texels,
+    texture::{Texels, Texture, TextureUse, Wrap},
 };
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::support::folder::{Folder, yard};
 
@@ -55,7 +55,13 @@ fn each_difference_is_named_by_the_format_that_forces_it() {
         image("scale = [-1, 1]")
     );
     let colored = "the colours of its surface or its vertices have no place in a metal";
-    let cases: [(&str, &[&str], &[&str]); 4] = [
+    let one_sided = "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]\ntwo_sided = false";
+    let cases: [(&str, &[&str], &[&str]); 5] = [
+        (
+            one_sided,
+            &["its back is black in Fenestra"],
+            &["its back is black in Fenestra, and as the front in pbrt"],
+        ),
         (
             "type = \"dielectric\"\nreflectance = [0.5, 1, 1]",
             &["the factor of its reflected light has no place in glTF's glass"],
@@ -142,6 +148,11 @@ fn gltf_keeps_dielectrics_cutoffs_and_skies() {
     let kind = |scene: &Scene| format!("{:?}", scene.materials[0].kind);
     assert_eq!(kind(&read), kind(&ours));
     assert_eq!(read.materials[0].surface.opacity.cutoff, Some(0.25));
+    square(&folder, &clay.replace("specular = 0.5", "specular = 1"));
+    let tinted = Scene::load(&folder.path().join("scene.toml")).unwrap();
+    let tinted_path = folder.path().join("b.gltf");
+    gltf::export(&tinted, &tinted_path).write().unwrap();
+    assert_eq!(kind(&Scene::load(&tinted_path).unwrap()), kind(&tinted));
     // A reader may refuse or leave out extensions that are not listed.
     let text = std::fs::read_to_string(&path).unwrap();
     let used = text.split_once("\"extensionsUsed\"").unwrap().1.split_once(']').unwrap().0;
@@ -184,4 +195,52 @@ fn coats_for_mitsuba_are_as_light_by_an_image_as_by_its_mean() {
             .map(|rough| of("[0.2, 0.2, 0.2]", &rough));
     assert!(number > 1.05 && (number - image).abs() < 2e-3, "{number} {image}");
     assert_eq!(of("{ texture = \"a.png\" }", "alpha = 0.25"), 1.0, "its red is 1 already");
+}
+
+#[test]
+fn light_of_backs_is_that_of_meshes_behind_for_mitsuba() {
+    let folder = Folder::new();
+    let clay = "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]\nemission = [1, 1, 1]\n\
+                emission_two_sided = true";
+    let path = folder.path().join("a.xml");
+    let scene = square(&folder, clay);
+    let exported = mitsuba::export(&scene, &path, SETTINGS);
+    exported.write().unwrap();
+    assert!(
+        !exported.warnings.iter().any(|text| text.contains("light")),
+        "{:?}",
+        exported.warnings
+    );
+    let Geometry { positions, normals, .. } = Scene::load(&path).unwrap().geometry;
+    // Only corners of the square stand so high; it faces +z.
+    let high = positions.iter().zip(&normals).filter(|(position, _)| position[1] > 0.9);
+    let sides: Vec<_> = high.map(|(position, normal)| (normal[2], position[2])).collect();
+    let (front, back): (Vec<_>, Vec<_>) = sides.into_iter().partition(|(normal, _)| *normal > 0.0);
+    assert!(!front.is_empty() && front.iter().all(|(_, z)| *z == 0.0), "{front:?}");
+    assert!(!back.is_empty() && back.iter().all(|(_, z)| (-0.01..0.0).contains(z)), "{back:?}");
+    let holes = "opacity = { texture = \"a.png\", channel = \"g\" }";
+    let scene = square(&folder, &format!("{clay}\n{holes}"));
+    let warnings = mitsuba::export(&scene, &path, SETTINGS).warnings;
+    assert!(
+        warnings.iter().any(|text| text.contains("also where it is not opaque")),
+        "{warnings:?}"
+    );
+}
+
+#[test]
+fn images_continue_as_far_as_pbrt_can() {
+    let folder = Folder::new();
+    let clay = "type = \"diffuse\"\nreflectance = { texture = \"a.png\", wrap = \"mirror\" }";
+    let mut scene = square(&folder, clay);
+    let used = scene.materials[0].surface.color.as_mut().unwrap();
+    let [end, centre] = [0.999, 0.75].map(|u| used.value(Vec2::new(u, 0.5)));
+    assert_eq!(end, centre, "a mirrored image goes on with its last texel");
+    let upright = Texture { width: 1, height: 2, ..(*used.texture).clone() };
+    let upright = TextureUse { texture: upright.into(), ..used.clone() };
+    let [across, along] = [&*used, &upright].map(|used| used.value(Vec2::splat(0.5)));
+    assert!(across == along && across != centre, "the mean of two columns is that of two rows");
+    used.wrap = [Wrap::Clamp, Wrap::Repeat];
+    let [_, (warnings, read)] = again(&folder, &scene);
+    assert!(warnings[0].contains("continues along u and v in two ways"), "{warnings:?}");
+    assert_eq!(read.materials[0].surface.color.as_ref().unwrap().wrap, [Wrap::Clamp; 2]);
 }
