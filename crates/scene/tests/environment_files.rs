@@ -9,6 +9,7 @@ use exr::prelude::{
 use fenestra_scene::{
     environment::{CourtParameters, EnvironmentMap, EnvironmentTables, SkyParameters},
     math::{colour::luminance, frame::direction_from_lat_long},
+    picture::RgbImage,
 };
 use glam::{Vec2, Vec3};
 
@@ -388,6 +389,8 @@ fn parameters_out_of_range_are_refused_by_name() {
         (daylight("sun_direction = [0, 0, 0]"), "expected a vector other than 0"),
         (court("width = 0"), "width = 0"),
         (court("eye_height = 30"), "eye_height = 30"),
+        (court("court_width = 0"), "court_width = 0"),
+        (court("glint = [-1, 0, 0]"), "glint"),
         (court("storeys = 0"), "storeys = 0"),
         (court("facade = [2, 0, 0]"), "facade = 2"),
         (court("window_spacing = 0"), "window_spacing"),
@@ -400,5 +403,9 @@ fn parameters_out_of_range_are_refused_by_name() {
     }
     assert!(EnvironmentMap::constant(Vec3::new(1.0, -1.0, 0.0), 1.0).is_err());
     assert!(EnvironmentMap::constant(Vec3::ONE, f32::NAN).is_err());
+    let square = RgbImage { width: 1, height: 1, pixels: vec![[1.0; 3]] };
+    let mut warnings = Vec::new();
+    EnvironmentMap::of_image("square", &square, 1.0, &mut warnings).unwrap();
+    assert!(warnings[0].starts_with("square: 1×1 texels; a lat-long map"), "{warnings:?}");
     assert!(EnvironmentMap::sky(&SkyParameters::default(), f32::MAX).is_err());
 }

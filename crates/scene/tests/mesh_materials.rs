@@ -380,8 +380,17 @@ fn quantized_attributes_are_numbers() {
     assert_eq!(mesh.uvs[0], [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]]);
     assert_eq!(mesh.colors[0], [1.0, 0.2, 0.0, 0.4]);
     assert!(mesh.materials[0].material.surface.vertex_color);
-    assert_eq!(load(r#"{"alphaMode": "MASK"}"#).colors[0], mesh.colors[0]);
+    let masked = load(r#"{"alphaMode": "MASK"}"#);
+    assert_eq!(masked.colors[0], mesh.colors[0]);
+    assert_eq!(masked.materials[0].material.surface.opacity.cutoff, Some(0.5));
     assert_eq!(load("{}").colors[2], [0.0, 0.0, 0.0, 1.0], "opaque materials ignore alpha");
+    let bare = [
+        Attribute::floats("POSITION", "VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
+        Attribute::floats("COLOR_0", "VEC3", &[0.5, 0.25, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]),
+    ];
+    let path = folder.write("a.gltf", gltf_of(&bare, 3, r#"{"alphaMode": "BLEND"}"#, ""));
+    let mesh = Mesh::read(&path, &mut Vec::new()).unwrap();
+    assert_eq!(mesh.colors[0], [0.5, 0.25, 0.0, 1.0], "opaque without a fourth number");
 }
 
 #[test]
@@ -676,6 +685,16 @@ fn names_do_not_leave_the_folder_of_the_scene() {
     let mesh = Mesh::read(&path, &mut Vec::new()).unwrap();
     assert!(mesh.materials[0].material.surface.color.is_some());
     assert_eq!(mesh.side_files.len(), 2);
+}
+
+#[test]
+fn triangles_without_area_are_dropped_with_a_word() {
+    let folder = Folder::new();
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nf 1 2 3\nf 1 2 4\n";
+    let scene = Scene::load(&folder.write("a.obj", text)).unwrap();
+    assert_eq!(scene.geometry.triangles.len(), 1);
+    let expected = "dropped 1 triangles of zero area of 2";
+    assert!(scene.warnings.iter().any(|text| text.ends_with(expected)), "{:?}", scene.warnings);
 }
 
 #[test]

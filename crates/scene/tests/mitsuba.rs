@@ -400,6 +400,7 @@ fn principled_becomes_the_material_of_gltf() {
     ));
     let MaterialKind::Principled(Principled { base_color, .. }) = found.kind else { panic!() };
     assert_close(base_color, Vec3::splat(0.5 * (1.0 + 0.7874 * 0.031)));
+    assert!(found.surface.metallic.is_some());
     let (glass, warnings) = material(
         r#"<bsdf type="principled"><rgb name="base_color" value="0.25"/>
         <float name="roughness" value="0.5"/><float name="eta" value="1.3"/>
@@ -853,6 +854,16 @@ fn serialized_meshes_of_both_versions_are_read() {
         folder.write("a.serialized", serialized(version, flags | 0x0010, 2));
         assert_eq!(loaded(&path).geometry.normals[2], [0.0; 3], "flat where the file says so");
     }
+    // The offsets of two meshes stand at the end.
+    let mut two = serialized(3, SINGLE, 2);
+    two.truncate(two.len() - 8);
+    let numbers = [0, two.len() as u32, 2].map(u32::to_le_bytes).concat();
+    two.extend(serialized(3, DOUBLE, 2).split_last_chunk::<8>().unwrap().0);
+    folder.write("a.serialized", [two, numbers].concat());
+    for index in 0..2 {
+        let scene = loaded(&folder.write("b.xml", document(&shape(index))));
+        assert_eq!(scene.geometry.positions[1], [1.0, 0.0, 0.0], "mesh {index}");
+    }
     let whole = serialized(4, SINGLE, 2);
     for length in 0..whole.len() {
         folder.write("a.serialized", &whole[..length]);
@@ -870,23 +881,26 @@ fn serialized_meshes_of_both_versions_are_read() {
 fn what_is_not_understood_is_named_once_with_its_line() {
     let scene = load(
         r#"
-        <integrator type="depth"/>
+        <integrator type="depth"><boolean name="hide_emitters" value="true"/></integrator>
         <bsdf type="diffuse" id="paint"><boolean name="shiny" value="true"/></bsdf>
         <shape type="cube"><ref id="paint"/><float name="mass" value="3"/></shape>
         <shape type="cube"><ref id="paint"/><float name="mass" value="3"/>
           <medium type="homogeneous" name="interior"/></shape>
-        <fog/>"#,
+        <fog/>
+        <emitter type="sunsky"><boolean name="complex_sun" value="true"/></emitter>"#,
     );
     let texts: Vec<_> =
         scene.warnings.iter().map(|text| text.split_once(": ignored ").unwrap().1).collect();
     assert_eq!(
         texts,
         [
+            "`hide_emitters` (line 6): lights are seen",
             "integrator `depth` (line 6)",
             "`shiny` of `diffuse` (2, first in line 7)",
             "`mass` of `cube` (2, first in line 8)",
             "other uses of `medium` (line 10)",
             "`fog` in `scene` (line 11)",
+            "`complex_sun` of `sunsky` (line 12)",
         ]
     );
 }

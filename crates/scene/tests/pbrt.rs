@@ -862,6 +862,8 @@ fn files_that_would_exhaust_the_program_are_refused_soon() {
                NamedMaterial \"m\"";
     let found = refused(format!("{head}{mix} {TRIANGLE}"));
     assert!(found.starts_with("room.pbrt:2:1: ") && found.contains("mix one another"), "{found}");
+    let found = refused(format!("{head}Shape \"disk\" \"float innerradius\" 1"));
+    assert!(found.ends_with("`innerradius` from 0 to below the radius, found 1"), "{found}");
 }
 
 #[test]
@@ -944,7 +946,7 @@ fn mixtures_of_diffuse_materials_are_diffuse() {
 fn everything_left_out_is_named_once() {
     let head = r#"Option "integer seed" 3
         ColorSpace "rec2020"
-        Integrator "volpath" "integer maxdepth" 7
+        Integrator "ambientocclusion" "integer maxdepth" 7
         Film "rgb" "string sensor" "canon_eos_100d" "float cropwindow" [0 1 0 0.5]
         Camera "perspective" "float halffov" 3"#;
     let world = format!(
@@ -969,6 +971,7 @@ fn everything_left_out_is_named_once() {
         "ignored ColorSpace `rec2020` (line 2)",
         "ignored `ActiveTransform`, `TransformTimes` (line 7): nothing moves",
         "ignored other media (5, first in line 8)",
+        "ignored Integrator `ambientocclusion` (line 3)",
         "ignored sensor `canon_eos_100d` (line 4)",
         "ignored `cropwindow` of the film (line 4)",
         "ignored parameter `halffov` of Camera \"perspective\" (line 5)",

@@ -921,6 +921,9 @@ fn files_that_are_no_scenes_are_refused() {
     let folder = Folder::new();
     let path = folder.write("binary.toml", [b'a', 0xff, 0xfe]);
     assert!(Scene::load(&path).unwrap_err().to_string().contains("byte 1 is not UTF-8"));
+    let options = LoadOptions { variant: Some("red".into()), ..LoadOptions::default() };
+    let message = Scene::load_with(&folder.write("a.toml", HEAD), &options).unwrap_err();
+    assert!(message.to_string().contains("--variant red: the option is for glTF files"));
 }
 
 #[test]
@@ -949,6 +952,16 @@ fn the_hash_follows_the_picture_and_not_the_text() {
         hash(&format!("{HEAD}[[object]]\nmesh = \"a.ply\"\nmaterial = \"grey\"\n"))
     };
     assert_ne!(mesh("3 0 1 2"), mesh("3 1 2 3"));
+    let portal = |width: u32| {
+        let edges = format!("first_edge = [{width}, 0, 0]\nsecond_edge = [0, 1, 0]");
+        hash(&with_box(&format!("[[portal]]\ncorner = [0, 0, 0]\n{edges}")))
+    };
+    assert_ne!(portal(1), portal(2));
+    let lamp = |height: u32| {
+        let keys = format!("position = [0, {height}, 0]\nintensity = [1, 1, 1]");
+        hash(&with_box(&format!("[[lamp]]\ntype = \"point\"\n{keys}")))
+    };
+    assert_ne!(lamp(1), lamp(2));
 }
 
 #[test]
@@ -1045,6 +1058,9 @@ fn ply_reads_all_three_encodings() {
     assert_eq!(ascii.triangles.len(), 3);
     let squares = read(&folder, "squares.ply", ascii_ply("4 0 1 2 3\n4 3 2 1 0"));
     assert_eq!(squares.triangles.len(), 4);
+    let strips = "element tristrips 0\nproperty list uchar int vertex_indices\nend_header";
+    let no_strips = ascii_ply("3 0 1 2").replace("end_header", strips);
+    assert_eq!(read(&folder, "strips.ply", no_strips).triangles.len(), 1);
     let windows = ascii_ply("3 0 1 2").replace('\n', "\r\n");
     assert_eq!(read(&folder, "windows.ply", windows).triangles, [[0, 1, 2]]);
 }
