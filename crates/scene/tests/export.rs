@@ -203,7 +203,8 @@ fn light_of_backs_is_that_of_meshes_behind_for_mitsuba() {
     let clay = "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]\nemission = [1, 1, 1]\n\
                 emission_two_sided = true";
     let path = folder.path().join("a.xml");
-    let scene = square(&folder, clay);
+    let lamp = "[[lamp]]\ntype = \"point\"\nposition = [1, 2, 3]\nintensity = [4, 5, 6]";
+    let scene = square(&folder, &format!("{clay}\n{lamp}"));
     let exported = mitsuba::export(&scene, &path, SETTINGS);
     exported.write().unwrap();
     assert!(
@@ -211,7 +212,9 @@ fn light_of_backs_is_that_of_meshes_behind_for_mitsuba() {
         "{:?}",
         exported.warnings
     );
-    let Geometry { positions, normals, .. } = Scene::load(&path).unwrap().geometry;
+    let read = Scene::load(&path).unwrap();
+    assert_eq!(read.lamps.len(), 1);
+    let Geometry { positions, normals, .. } = read.geometry;
     // Only corners of the square stand so high; it faces +z.
     let high = positions.iter().zip(&normals).filter(|(position, _)| position[1] > 0.9);
     let sides: Vec<_> = high.map(|(position, normal)| (normal[2], position[2])).collect();
@@ -228,7 +231,7 @@ fn light_of_backs_is_that_of_meshes_behind_for_mitsuba() {
 }
 
 #[test]
-fn images_continue_as_far_as_pbrt_can() {
+fn images_continue_as_far_as_formats_let_them() {
     let folder = Folder::new();
     let clay = "type = \"diffuse\"\nreflectance = { texture = \"a.png\", wrap = \"mirror\" }";
     let mut scene = square(&folder, clay);
@@ -243,4 +246,10 @@ fn images_continue_as_far_as_pbrt_can() {
     let [_, (warnings, read)] = again(&folder, &scene);
     assert!(warnings[0].contains("continues along u and v in two ways"), "{warnings:?}");
     assert_eq!(read.materials[0].surface.color.as_ref().unwrap().wrap, [Wrap::Clamp; 2]);
+    let path = folder.path().join("a.xml");
+    mitsuba::export(&scene, &path, SETTINGS).write().unwrap();
+    let read = Scene::load(&path).unwrap();
+    let images: Vec<_> =
+        read.materials.iter().filter_map(|own| own.surface.color.as_ref()).collect();
+    assert!(!images.is_empty() && images.iter().all(|used| used.wrap == [Wrap::Clamp; 2]));
 }

@@ -235,6 +235,10 @@ fn quadrics_and_patches_face_outward() {
     }
     let curved = world("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]");
     assert_eq!(curved.geometry.triangles.len(), 512);
+    let is_saddle = |at: &Vec3| (at.z - at.x * at.y).abs() < 1e-5;
+    assert!(positions(&curved).iter().all(is_saddle));
+    let flat = world("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 1 1 0 2 1 0]");
+    assert_eq!(flat.geometry.triangles.len(), 2);
     // v of a sphere runs from −z to +z.
     let sphere = world(
         r#"Texture "t" "spectrum" "checkerboard"

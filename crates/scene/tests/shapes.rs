@@ -269,6 +269,10 @@ fn grids_are_sheets_of_their_thickness() {
     assert_eq!(check_closed(&mesh).1, 2);
     let highest = mesh.positions.iter().map(|position| position[1]).fold(0.0, f32::max);
     assert!((highest - 0.052).abs() < 1e-3, "{highest}");
+    let crest = shape("grid", &folded.replace("0.25 }", "0.25, phase_deg = 90 }")).unwrap();
+    let middle = crest.positions.iter().filter(|position| position[0].abs() < 1e-5);
+    let highest = middle.map(|position| position[1]).fold(0.0, f32::max);
+    assert!((highest - 0.052).abs() < 1e-4, "{highest}");
     // The steepest slope of the wave is 2π · 0.05 / 0.25, along x or z.
     let across =
         folded.replace("[200, 4]", "[4, 200]").replace("0.25 }", "0.25, direction_deg = 90 }");
