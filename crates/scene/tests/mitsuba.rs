@@ -854,13 +854,16 @@ fn serialized_meshes_of_both_versions_are_read() {
         folder.write("a.serialized", serialized(version, flags | 0x0010, 2));
         assert_eq!(loaded(&path).geometry.normals[2], [0.0; 3], "flat where the file says so");
     }
-    // The offsets of two meshes stand at the end.
-    let mut two = serialized(3, SINGLE, 2);
-    two.truncate(two.len() - 8);
-    let numbers = [0, two.len() as u32, 2].map(u32::to_le_bytes).concat();
-    two.extend(serialized(3, DOUBLE, 2).split_last_chunk::<8>().unwrap().0);
-    folder.write("a.serialized", [two, numbers].concat());
-    for index in 0..2 {
+    // The offsets of the meshes and their count stand at the end.
+    let (mut file, mut numbers) = (Vec::new(), Vec::new());
+    for flags in [SINGLE, DOUBLE, SINGLE] {
+        numbers.push(file.len() as u32);
+        file.extend(serialized(3, flags, 2).split_last_chunk::<8>().unwrap().0);
+    }
+    numbers.push(3);
+    file.extend(numbers.into_iter().flat_map(u32::to_le_bytes));
+    folder.write("a.serialized", file);
+    for index in 0..3 {
         let scene = loaded(&folder.write("b.xml", document(&shape(index))));
         assert_eq!(scene.geometry.positions[1], [1.0, 0.0, 0.0], "mesh {index}");
     }
