@@ -200,7 +200,8 @@ impl<'a> Textures<'a> {
             other => return Err(entity.error(format!("unknown wrap mode `{other}`"))),
         }; 2];
         if is_number {
-            // pbrt takes opacity where the image has it, else the mean of the colours.
+            // Deviation: pbrt takes opacity where the image has it, else the mean of the colours; here their
+            // luminance is the number, but for roughness.
             image.channels =
                 if has_alpha(&image.texture) { Channels::Alpha } else { Channels::Color };
         }
