@@ -11,7 +11,6 @@ mod exr;
 mod fuzz;
 mod import;
 mod instances_in_files;
-mod math;
 mod mesh_materials;
 mod mitsuba;
 mod pbrt;

@@ -921,9 +921,6 @@ fn files_that_are_no_scenes_are_refused() {
     let folder = Folder::new();
     let path = folder.write("binary.toml", [b'a', 0xff, 0xfe]);
     assert!(Scene::load(&path).unwrap_err().to_string().contains("byte 1 is not UTF-8"));
-    let options = LoadOptions { variant: Some("red".into()), ..LoadOptions::default() };
-    let message = Scene::load_with(&folder.write("a.toml", HEAD), &options).unwrap_err();
-    assert!(message.to_string().contains("--variant red: the option is for glTF files"));
 }
 
 #[test]
