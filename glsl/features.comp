@@ -38,7 +38,7 @@ void keep_features(uint path) {
             load_surface(path, triangle_material(hit.triangle, load_hit_instance(path)));
         feature.albedo = paths[path].throughput
             * brdf_albedo(material, to_local(frame, -ray.direction));
-        feature.normal = hit.shading_normal;
+        feature.normal = faceforward(hit.shading_normal, ray.direction, hit.geometric_normal);
         feature.is_open = is_perfectly_specular(material) ? 1u : 0u;
     }
     features[path] = feature;

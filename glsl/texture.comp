@@ -55,11 +55,13 @@ void read_textures(uint path) {
 
     if (surface.normal != NO_TEXTURE) {
         float side = is_back(hit.triangle, instance, ray.direction) ? -1.0 : 1.0;
+        // trace.comp may have turned the normals to the other side of a sheet.
+        float turn = dot(hit.geometric_normal, ray.direction) > 0.0 ? -1.0 : 1.0;
         vec3 mapped = mapped_normal(
             surface.normal, normal, surface.normal_scale, hit.triangle, instance, attributes,
-            hit.shading_normal, side);
+            turn * hit.shading_normal, side);
         hits[path].shading_normal =
-            visible_normal(mapped, hit.geometric_normal, ray.direction);
+            turn * visible_normal(mapped, turn * hit.geometric_normal, ray.direction);
     }
 }
 

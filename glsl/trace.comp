@@ -18,6 +18,9 @@ UPDATES(hit_instances)
 UPDATES(paths)
 UPDATES(counters)
 
+// First dimension of the sides from which paths go on, beyond those of all vertices and of sharing.
+const uint DIMENSION_SIDE = 0x48000000u;
+
 layout(constant_id = CONSTANT_ANSWERED) const uint ANSWERED = 0u;
 
 // Tests whether light is sampled at a surface: not at a specular one, nor at the black back of a
@@ -56,6 +59,20 @@ bool goes_through(uint path) {
         bvh_restart(FAR_AWAY, false);
     }
     return goes_on;
+}
+
+// Decides by chance whether a path goes on from the other side of a sheet that scatters light to both.
+bool goes_on_behind(uint path, uint material_index) {
+    if ((MATERIAL_KINDS & (1u << MATERIAL_DIFFUSE_TRANSMISSION)) == 0u) {
+        return false;
+    }
+    Material material = load_material(material_index);
+    PathIndex index = wave_path(path);
+    return material.kind == MATERIAL_DIFFUSE_TRANSMISSION
+        && random_1d(
+               index.pixel, index.sample_index - wave.epoch_start, DIMENSION_SIDE + wave.vertex,
+               wave.seed ^ wave.epoch_seed)
+            >= material.ior;
 }
 
 void start_ray(uint path) {
@@ -97,6 +114,10 @@ void main() {
             hits[path] = no_surface();
         } else {
             Hit hit = surface_at(triangle, instance, ray.origin, ray.direction);
+            if (goes_on_behind(path, hit.material)) {
+                hit.geometric_normal = -hit.geometric_normal;
+                hit.shading_normal = -hit.shading_normal;
+            }
             hit.material = samples_light(hit.material, triangle, instance, ray.direction)
                 ? hit.material
                 : NO_MATERIAL;

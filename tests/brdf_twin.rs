@@ -38,6 +38,8 @@ fn query(index: u32) -> BrdfQuery {
     let u = uniform(index, 7);
     let outgoing_local = match index % 5 {
         0 => Vec3::Z,
+        // From the other side, which sheets show.
+        2 => -hemisphere(index, 8),
         1 => direction(f64::from(1.5 + 0.07 * u.x), f64::from(6.0 * u.y)),
         _ => hemisphere(index, 8),
     };

@@ -71,6 +71,10 @@ fn surfaces_are_shown_in_mirrors_and_through_glass() {
     let pane =
         MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: Vec3::ONE };
     let (smooth, rough) = (MaterialKind::glass(1.5, 0.0), MaterialKind::glass(1.5, 0.3));
+    let sheet = MaterialKind::DiffuseTransmission {
+        reflectance: Vec3::new(0.4, 0.1, 0.3),
+        transmittance: Vec3::new(0.1, 0.6, 0.7),
+    };
     let seen = Vec3::new(0.6, 0.0, 0.3);
     let black = MaterialKind::Mirror { reflectance: Vec3::ZERO };
     for (kind, depth, albedo, normal) in [
@@ -79,6 +83,7 @@ fn surfaces_are_shown_in_mirrors_and_through_glass() {
         (pane, 4, seen, 0.6..=0.95),
         (smooth, 6, seen, 0.6..=0.95),
         (rough, 2, Vec3::ONE, 0.999..=1.0),
+        (sheet, 2, Vec3::new(0.5, 0.7, 1.0), 0.999..=1.0),
     ] {
         let mut scene = hall();
         scene.materials.push(Material::new("specular", kind.clone()));

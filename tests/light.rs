@@ -10,7 +10,7 @@ use fenestra::{
         Geometry, Scene,
         lamp::{LampKind, Spot, SpotFalloff},
         material::{Emission, Material, MaterialKind},
-        texture::{Interpolation, Texels, Texture, TextureUse},
+        texture::{Encoding, Interpolation, Texels, Texture, TextureUse},
     },
     session::Settings,
 };
@@ -314,6 +314,61 @@ fn panes_reflect_and_pass_their_tints() {
             (opacity - passed) * (reflectance * SKY).as_dvec3()
                 + (passed * transmittance.as_dvec3() + (1.0 - opacity)) * GROUND.as_dvec3()
         });
+    }
+}
+
+/// A sheet shows the mean light of either side by a share each, from above and from below, whatever the
+/// sampler.
+#[test]
+fn sheets_scatter_light_through() {
+    let _alone = support::alone();
+    let [reflectance, transmittance] = [Vec3::new(0.1, 0.6, 0.3), Vec3::new(0.7, 0.2, 0.1)];
+    let sheet = MaterialKind::DiffuseTransmission { reflectance, transmittance };
+    let mut scene = between_sky_and_ground(sheet);
+    // Light of both sides that the samplers tell apart by its luminance as well.
+    let [above, below] = [2.0 * SKY, 0.5 * GROUND];
+    scene.environment = scenes::environment(64, |to| if to.y > 0.0 { above } else { below });
+    let texels = Texels::Bytes(vec![[255; 4]]);
+    let white =
+        TextureUse::new(Arc::new(Texture { name: "w".into(), width: 1, height: 1, texels }));
+    let texels = Texels::Bytes(vec![[128, 128, 255, 255]]);
+    let flat = Texture { name: "n".into(), width: 1, height: 1, texels };
+    let flat = TextureUse { encoding: Encoding::Linear, ..TextureUse::new(Arc::new(flat)) };
+    for is_textured in [false, true] {
+        if is_textured {
+            let half = TextureUse { scale: [0.5; 3], ..white.clone() };
+            scene.materials[0].surface.color = Some(half);
+            scene.materials[0].surface.normal = Some(flat.clone());
+            scene.geometry.uvs = [vec![[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]], Vec::new()];
+        }
+        let share = if is_textured { 0.5 } else { 1.0 };
+        for sampler in Sampler::ALL {
+            for (near, far) in [(above, below), (below, above)] {
+                let expected = share * (reflectance * near + transmittance * far).as_dvec3();
+                let [mean, error] = mean_and_error(&scene, &settings(*sampler, 2), 8, 6);
+                eprintln!("{}: {mean:.4} ± {error:.4}, {expected:.4}", sampler.name());
+                let off = (mean - expected).abs() - 6.0 * error - 2e-3 * expected;
+                assert!(off.max_element() < 0.0, "{}: {mean}, not {expected}", sampler.name());
+                scene.camera.position.y *= -1.0;
+            }
+        }
+    }
+}
+
+/// No sheet of a box loses light, whichever side paths take at each, and whether pixels share paths or not.
+#[test]
+fn sheets_lose_nothing_in_a_furnace() {
+    let _alone = support::alone();
+    let reflectance = Vec3::new(0.2, 0.4, 0.7);
+    let transmittance = Vec3::ONE - reflectance;
+    let sheet = MaterialKind::DiffuseTransmission { reflectance, transmittance };
+    let scene = scenes::convex_furnace(Material::new("sheet", sheet), Vec3::splat(2.0));
+    for sampler in [Sampler::Mis, Sampler::Guided] {
+        let [mean, error] = mean_and_error(&scene, &settings(sampler, 40), 32, 8);
+        eprintln!("{}: {mean} ± {error}", sampler.name());
+        let off = (mean - 2.0).abs() - 6.0 * error;
+        assert!(off.max_element() < 2e-3, "{}: {mean} ± {error}", sampler.name());
+        assert!(error.max_element() < 0.01, "{}: too noisy to judge", sampler.name());
     }
 }
 

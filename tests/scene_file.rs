@@ -230,13 +230,13 @@ fn table(all: &str, name: &str) -> String {
 /// Kinds that the parser tells apart, with the struct of each.
 fn kinds(mark: &str, after: &str, suffix: &str) -> Vec<(String, String)> {
     let read = source("file/read.rs");
-    let kind = |line: &str| {
-        let (name, rest) = line.trim().strip_prefix("(\"")?.split_once("\", ")?;
+    let kind = |text: &str| {
+        let (name, rest) = text.split_once("\", ")?;
         let entry = between(rest, mark, after)?;
         Some((name.to_owned(), format!("{entry}{suffix}")))
     };
-    let kinds: Vec<_> = read.lines().filter_map(kind).collect();
-    assert!(!kinds.is_empty(), "{mark}");
+    let kinds: Vec<_> = read.split("\n    (\"").filter_map(kind).collect();
+    assert_eq!(kinds.len(), read.matches(mark).count(), "{mark}");
     kinds
 }
 

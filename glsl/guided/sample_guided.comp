@@ -23,7 +23,7 @@ const float UNGUIDED_CHOICE = 0.1;
 // Share of rays from the BRDF in the one-sample model, in 256ths, if the cell has learned none.
 uint brdf_share(Material material) {
     uint share = 77u;
-    if (is_kind(material, MATERIAL_DIFFUSE)) {
+    if (is_diffuse(material)) {
         share = 26u;
     } else if (is_kind(material, MATERIAL_PRINCIPLED) && material.ior < 0.5) {
         // Most light of a principled dielectric comes from its diffuse base.

@@ -23,6 +23,11 @@ bool is_kind(Material material, uint kind) {
     return MATERIAL_KINDS == bit || ((MATERIAL_KINDS & bit) != 0u && material.kind == kind);
 }
 
+// Tests for a material that scatters alike to all directions of a side.
+bool is_diffuse(Material material) {
+    return is_kind(material, MATERIAL_DIFFUSE) || is_kind(material, MATERIAL_DIFFUSE_TRANSMISSION);
+}
+
 // Word of the BRDF table as a float.
 float table_value(uint index) {
     return texelFetch(brdf_table, int(index)).x;
@@ -188,6 +193,12 @@ struct Reflector {
 };
 
 Reflector reflector_from(Material material, vec3 outgoing_local) {
+    // From the other side of a sheet, to which trace.comp has turned the normals, it shows what it transmits;
+    // each side over the probability of that.
+    if (is_kind(material, MATERIAL_DIFFUSE_TRANSMISSION)) {
+        material.reflectance *= outgoing_local.z < 0.0 ? material.eta : material.k;
+        outgoing_local.z = abs(outgoing_local.z);
+    }
     Reflector reflector = Reflector(
         material, outgoing_local, 0.0, 0.0, ggx_stretched_length(outgoing_local, material.alpha),
         ggx_cap_factor(outgoing_local, material.alpha), 0u);
@@ -287,7 +298,7 @@ void brdf_evaluate_and_pdf(
         return;
     }
     float cosine_pdf = incident_local.z / PI;
-    if (is_kind(material, MATERIAL_DIFFUSE)) {
+    if (is_diffuse(material)) {
         value = material.reflectance / PI;
         pdf = cosine_pdf;
         return;
@@ -335,7 +346,7 @@ vec3 brdf_evaluate(Reflector reflector, vec3 incident_local) {
 // as one with contribution 0.
 vec3 brdf_sample(Reflector reflector, vec3 u) {
     Material material = reflector.material;
-    bool is_sampled = is_kind(material, MATERIAL_DIFFUSE) || is_kind(material, MATERIAL_PLASTIC)
+    bool is_sampled = is_diffuse(material) || is_kind(material, MATERIAL_PLASTIC)
         || is_kind(material, MATERIAL_CONDUCTOR) || is_kind(material, MATERIAL_MEASURED)
         || is_kind(material, MATERIAL_PRINCIPLED);
     if (reflector.outgoing_local.z <= 0.0 || !is_sampled) {
@@ -351,11 +362,14 @@ vec3 brdf_sample(Reflector reflector, vec3 u) {
 }
 
 // Share of light from a uniform white hemisphere reflected toward the outgoing direction, 0…1, for
-// the albedo image. Dielectrics and panes count transmitted light too, seen from outside and as if
-// smooth.
+// the albedo image. Dielectrics, panes and sheets count transmitted light too, the first seen from outside
+// and as if smooth.
 vec3 brdf_albedo(Material material, vec3 outgoing_local) {
     if (is_kind(material, MATERIAL_DIFFUSE) || is_kind(material, MATERIAL_MIRROR)) {
         return material.reflectance;
+    }
+    if (is_kind(material, MATERIAL_DIFFUSE_TRANSMISSION)) {
+        return material.reflectance * mix(material.eta, material.k, material.ior);
     }
     uint offset = material.table_offset;
     if (is_kind(material, MATERIAL_PLASTIC)) {

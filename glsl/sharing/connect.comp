@@ -25,7 +25,7 @@ const float LEAST_SQUARED_DISTANCE = 1.0e-18;
 // Radiance that the shared part of an offered vertex sends into a direction.
 vec3 offered_radiance(uint path, Offer offer, vec3 outgoing) {
     Material material = load_material(offer.material);
-    if (is_kind(material, MATERIAL_DIFFUSE)) {
+    if (is_diffuse(material)) {
         return offer.radiance;
     }
     // The rest of the offer is fetched only here.

@@ -18,7 +18,7 @@ void gather_path(uint path) {
         return;
     }
     Material material = load_surface(path, second.material);
-    if (is_kind(material, MATERIAL_DIFFUSE)) {
+    if (is_diffuse(material)) {
         return;
     }
     Frame frame = frame_from_normal(second.shading_normal);

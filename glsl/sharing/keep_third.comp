@@ -18,7 +18,7 @@ void keep_third(uint path) {
     }
     Material material = load_surface(path, second.material);
     Ray ray = load_ray(path);
-    if (ray.is_active != 0u && !is_kind(material, MATERIAL_DIFFUSE)) {
+    if (ray.is_active != 0u && !is_diffuse(material)) {
         Frame frame = frame_from_normal(second.shading_normal);
         Reflector reflector = reflector_from(material, to_local(frame, second.outgoing));
         second_vertices[path].bounce_direction = ray.direction;

@@ -19,7 +19,7 @@ void offer_path(uint path) {
     }
     vec3 beyond = paths[path].radiance;
     vec3 light;
-    if (is_kind(load_material(second.material), MATERIAL_DIFFUSE)) {
+    if (is_diffuse(load_material(second.material))) {
         second.shared_light = second.direct + beyond;
         light = second.shared_light;
     } else {

@@ -10,6 +10,7 @@ use crate::{
         ggx::SMALLEST_ALPHA,
     },
     error::{Error, Result},
+    math::colour::luminance,
     scene::material::{ConductorFresnel, Material, MaterialKind},
     shader::{constants::*, structs},
 };
@@ -44,6 +45,20 @@ impl MaterialTables {
                 MaterialKind::Diffuse { reflectance } => {
                     converted.kind = MATERIAL_DIFFUSE;
                     converted.reflectance = reflectance.to_array();
+                }
+                MaterialKind::DiffuseTransmission { reflectance, transmittance } => {
+                    let [kept, passed] = [*reflectance, *transmittance].map(luminance);
+                    let probability = if passed > 0.0 { kept / (kept + passed) } else { 1.0 };
+                    let whole = reflectance.max(*transmittance);
+                    let part = |side: &Vec3, probability: f32| {
+                        let scale = (whole * probability).max(Vec3::splat(f32::MIN_POSITIVE));
+                        (side / scale).to_array()
+                    };
+                    converted.kind = MATERIAL_DIFFUSE_TRANSMISSION;
+                    converted.reflectance = whole.to_array();
+                    converted.ior = probability;
+                    converted.k = part(reflectance, probability);
+                    converted.eta = part(transmittance, 1.0 - probability);
                 }
                 MaterialKind::Plastic { diffuse, alpha, ior } => {
                     converted.kind = MATERIAL_PLASTIC;

@@ -9,6 +9,7 @@
 //! | kind | value | samples |
 //! |---|---|---|
 //! | diffuse | reflectance / π | cosine |
+//! | sheet | reflectance / π, or from the other side transmittance / π, over the probability of the side | cosine |
 //! | plastic | GGX coat, exact dielectric Fresnel, over ρ/π·T(θ_o)·T(θ_i), T² = (1−E)²/(1−Ē) | visible normals or cosine, by albedo |
 //! | conductor | GGX, exact conductor Fresnel or Schlick's | visible normals |
 //! | principled | GGX with Schlick's reflectance, over (1−metallic)·(1−F)·ρ/π | visible normals or cosine, by albedo |
@@ -31,7 +32,7 @@ mod value;
 use glam::Vec3;
 
 pub use materials::MaterialTables;
-pub use value::brdf_evaluate;
+pub use value::{brdf_evaluate, of_side};
 
 /// Value of a material, 1/sr, without the cosine.
 pub fn evaluate(

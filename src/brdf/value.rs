@@ -29,6 +29,23 @@ fn principled_value(material: &Material, reflection: f32, cosine_difference: f32
     mix_vec3(base + reflection * dielectric, reflection * metal, metallic)
 }
 
+/// Tests for a material that scatters alike to all directions of a side.
+fn is_diffuse(material: &Material) -> bool {
+    matches!(material.kind, MATERIAL_DIFFUSE | MATERIAL_DIFFUSE_TRANSMISSION)
+}
+
+/// Material and outgoing direction at a sheet from whose other side the viewer looks: it shows there what it
+/// transmits, over the probability of that side. All others as they are.
+pub fn of_side(material: &Material, outgoing_local: Vec3) -> (Material, Vec3) {
+    let (mut material, mut outgoing_local) = (*material, outgoing_local);
+    if material.kind == MATERIAL_DIFFUSE_TRANSMISSION {
+        let side = if outgoing_local.z < 0.0 { material.eta } else { material.k };
+        material.reflectance = (Vec3::from(material.reflectance) * Vec3::from(side)).to_array();
+        outgoing_local.z = outgoing_local.z.abs();
+    }
+    (material, outgoing_local)
+}
+
 /// Value of a material at one pair of directions, 1/sr, without the cosine.
 ///
 /// # Panics
@@ -39,11 +56,13 @@ pub fn brdf_evaluate(
     outgoing_local: Vec3,
     incident_local: Vec3,
 ) -> Vec3 {
+    let (material, outgoing_local) = of_side(material, outgoing_local);
+    let material = &material;
     if outgoing_local.z <= 0.0 || incident_local.z <= 0.0 {
         return Vec3::ZERO;
     }
     let reflectance = Vec3::from(material.reflectance);
-    if material.kind == MATERIAL_DIFFUSE {
+    if is_diffuse(material) {
         return reflectance / PI;
     }
     if material.kind == MATERIAL_MEASURED {

@@ -8,12 +8,15 @@ use super::{
     surfaces::Surfaces,
 };
 use crate::shader::{
-    constants::{CONSTANT_COHORT_EDGE, MATERIAL_DIFFUSE, SPECULAR_KINDS},
+    constants::{
+        CONSTANT_COHORT_EDGE, MATERIAL_DIFFUSE, MATERIAL_DIFFUSE_TRANSMISSION, SPECULAR_KINDS,
+    },
     structs::Wave,
 };
 
 /// Bits of the kinds of material whose light looks the same from all sides, or is not shared.
-const SAME_OR_ALONE: u32 = SPECULAR_KINDS | 1 << MATERIAL_DIFFUSE;
+const SAME_OR_ALONE: u32 =
+    SPECULAR_KINDS | 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_DIFFUSE_TRANSMISSION;
 
 /// Moments of a vertex at which sharing may add a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

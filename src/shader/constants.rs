@@ -232,6 +232,8 @@ constants! {
     MATERIAL_DIELECTRIC = 6;
     /// Thin pane of a dielectric.
     MATERIAL_THIN_DIELECTRIC = 7;
+    /// Thin sheet that scatters light to both sides.
+    MATERIAL_DIFFUSE_TRANSMISSION = 8;
     /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
     SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
 

@@ -103,6 +103,14 @@ pub fn cases() -> &'static [Case] {
                     specular_color: vec3(1.0, 2.0, 20.0),
                 }),
             ),
+            case(
+                "sheet",
+                1.0,
+                MaterialKind::DiffuseTransmission {
+                    reflectance: 0.25 * vec3(0.8, 0.5, 0.2),
+                    transmittance: 0.75 * vec3(0.8, 0.5, 0.2),
+                },
+            ),
         ]
     })
 }

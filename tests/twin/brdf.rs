@@ -4,7 +4,7 @@
 use std::f32::consts::PI;
 
 use fenestra::{
-    brdf::{MaterialTables, brdf_evaluate, ggx::*},
+    brdf::{MaterialTables, brdf_evaluate, ggx::*, of_side},
     math::colour::luminance,
     scene::measured::lookup::{
         cosine_table, half_difference_angles, measured_pdf, measured_sample, mix,
@@ -105,6 +105,7 @@ pub fn brdf_evaluate_and_pdf(
     incident_local: Vec3,
 ) -> (Vec3, f32) {
     let value = brdf_evaluate(brdf_table, material, outgoing_local, incident_local);
+    let (_, outgoing_local) = of_side(material, outgoing_local);
     if outgoing_local.z <= 0.0 || incident_local.z <= 0.0 {
         return (value, 0.0);
     }
@@ -113,7 +114,7 @@ pub fn brdf_evaluate_and_pdf(
     let half_vector = outgoing_local + incident_local;
     let specular_pdf = || ggx_pdf(half_vector, outgoing_local, material.alpha);
     let pdf = match material.kind {
-        MATERIAL_DIFFUSE => cosine_pdf,
+        MATERIAL_DIFFUSE | MATERIAL_DIFFUSE_TRANSMISSION => cosine_pdf,
         MATERIAL_MEASURED => {
             let theta_half = half_difference_angles(outgoing_local, incident_local).x;
             measured_pdf(brdf_table, offset, outgoing_local, incident_local, theta_half)
@@ -143,6 +144,7 @@ fn specular_share(brdf_table: &[u32], material: &Material, cosine: f32) -> f32 {
 /// # Panics
 /// The material is of an unknown kind.
 pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3, u: Vec3) -> Vec3 {
+    let (_, outgoing_local) = of_side(material, outgoing_local);
     if outgoing_local.z <= 0.0 {
         return vec3(0.0, 0.0, -1.0);
     }
@@ -153,7 +155,7 @@ pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
         MATERIAL_MIRROR | MATERIAL_DIELECTRIC | MATERIAL_THIN_DIELECTRIC => {
             return vec3(0.0, 0.0, -1.0);
         }
-        MATERIAL_DIFFUSE => 0.0,
+        MATERIAL_DIFFUSE | MATERIAL_DIFFUSE_TRANSMISSION => 0.0,
         MATERIAL_CONDUCTOR => 1.0,
         MATERIAL_PLASTIC | MATERIAL_PRINCIPLED => {
             specular_share(brdf_table, material, outgoing_local.z)
@@ -167,8 +169,8 @@ pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
 }
 
 /// Share of light from a uniform white hemisphere reflected toward the outgoing direction, 0…1, for
-/// the albedo image. Dielectrics and panes count transmitted light too, seen from outside and as if
-/// smooth.
+/// the albedo image. Dielectrics, panes and sheets count transmitted light too, the first seen from outside
+/// and as if smooth.
 ///
 /// # Panics
 /// The material is of an unknown kind.
@@ -178,6 +180,9 @@ pub fn brdf_albedo(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
     let offset = material.table_offset;
     match material.kind {
         MATERIAL_DIFFUSE | MATERIAL_MIRROR => reflectance,
+        MATERIAL_DIFFUSE_TRANSMISSION => {
+            reflectance * mix_vec3(material.eta.into(), material.k.into(), material.ior)
+        }
         MATERIAL_PLASTIC => {
             let coat = cosine_table(brdf_table, offset, 1, cosine);
             Vec3::splat(coat) + (1.0 - coat) * reflectance

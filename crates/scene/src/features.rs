@@ -47,6 +47,7 @@ features! {
     GLTF_GLOSSINESS_TEXTURE
         "specular texture of `KHR_materials_pbrSpecularGlossiness` on other coordinates than the diffuse one"
         "its mean colour counts; its glossiness is read";
+    GLTF_SHEET "gloss, metal, volume and own pattern of `KHR_materials_diffuse_transmission`" "left out";
     GLTF_CLEARCOAT "`KHR_materials_clearcoat`" "without the gloss of the coat";
     GLTF_SHEEN "`KHR_materials_sheen`" "without the bright rim of cloth";
     GLTF_IRIDESCENCE "`KHR_materials_iridescence`" "reflections without the colours of thin films";
@@ -110,12 +111,13 @@ features! {
     PBRT_DISPLACEMENT "`displacement` of shapes, or beside a `normalmap`" "left out";
     PBRT_FLAT "shapes whose transformation flattens space" "left out";
     PBRT_COATED_CONDUCTOR "coat of `coatedconductor`" "rendered as the bare conductor";
-    PBRT_TRANSMISSION "light through `diffusetransmission`" "rendered as diffuse reflection";
+    PBRT_TRANSMISSION "images of `diffusetransmission` that differ"
+        "the ratio of `reflectance` to `transmittance` is the same everywhere";
     PBRT_SUBSURFACE "light below `subsurface`" "rendered as plastic";
     PBRT_HAIR "parameters of `hair`" "rendered as diffuse of 0.5";
     PBRT_MIX_LOBES "gloss of `mix`"
         "one lobe of the mean roughness; images on other coordinates than the first count by their means";
-    PBRT_MIX "the lesser part of `mix` with glass" "the other one is the whole surface";
+    PBRT_MIX "the lesser part of `mix` with glass or a sheet" "the other one is the whole surface";
     PBRT_COAT_ALBEDO "`albedo` of coats" "coats are clear";
     PBRT_ANISOTROPY "`uroughness` other than `vroughness`" "their mean α, or the texture";
     PBRT_TEXTURE "other textures, by name" "`fbm`, `marble`, `dots`, `ptex` and others are 0.5";
@@ -144,7 +146,7 @@ features! {
     MI_PHONG "`phong` and `ward`" "a metallic-roughness material of the same colours";
     MI_POLARIZED "polarisation of `pplastic`" "as `roughplastic`";
     MI_COATING "`coating` of other models than `diffuse`" "left out";
-    MI_DIFFUSE_TRANSMISSION "light through `difftrans`" "rendered as diffuse reflection";
+    MI_PRINCIPLED_THIN "gloss and clear part of `principledthin`" "left out";
     MI_WEIGHTS "sum of `weights` of `mixturebsdf` other than 1" "their ratios count";
     MI_TWO_MODELS "second model of `twosided`" "the first is on both sides";
     MI_SPEC_TRANS "`spec_trans` between 0 and 1"
@@ -152,7 +154,7 @@ features! {
     MI_PRINCIPLED_REST "further parameters of `principled`, by name" "";
     MI_BLEND_LOBES "gloss of `blendbsdf` and `mixturebsdf`"
         "one lobe of the mean roughness; images on other coordinates than the first count by their means";
-    MI_BLEND "the lesser part of `blendbsdf` and `mixturebsdf` with glass"
+    MI_BLEND "the lesser part of `blendbsdf` and `mixturebsdf` with glass or a sheet"
         "the other one is the whole surface";
     MI_BUMP_MAP "`bumpmap` of vertex colours, or beside a `normalmap`" "left out";
     MI_BECKMANN "distribution `beckmann`" "`ggx` of the same α";
@@ -176,12 +178,13 @@ features! {
 }
 
 /// Extensions of glTF that are read.
-pub const GLTF_EXTENSIONS: [&str; 14] = [
+pub const GLTF_EXTENSIONS: [&str; 15] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
+    "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",

@@ -32,7 +32,13 @@ impl Material {
         let color = mean(&self.surface.color);
         let rough = luminance(mean(&self.surface.roughness));
         let metal = luminance(mean(&self.surface.metallic));
-        self.kind.scaled(color, rough, metal)
+        match self.kind.scaled(color, rough, metal) {
+            // Both sides have the one lobe that is to be fitted.
+            MaterialKind::DiffuseTransmission { reflectance, transmittance } => {
+                MaterialKind::Diffuse { reflectance: (reflectance + transmittance).min(Vec3::ONE) }
+            }
+            kind => kind,
+        }
     }
 }
 
@@ -187,6 +193,9 @@ impl MaterialKind {
                 let factors = colors(&[reflectance, transmittance]);
                 ("thin_dielectric", 8, vec![vec![*ior], factors])
             }
+            Self::DiffuseTransmission { reflectance, transmittance } => {
+                ("diffuse_transmission", 9, vec![colors(&[reflectance, transmittance])])
+            }
         }
     }
 
@@ -198,6 +207,10 @@ impl MaterialKind {
             Self::Diffuse { reflectance: own }
             | Self::Mirror { reflectance: own }
             | Self::Plastic { diffuse: own, .. } => tint(own),
+            Self::DiffuseTransmission { reflectance, transmittance } => {
+                tint(reflectance);
+                tint(transmittance);
+            }
             Self::Conductor { alpha, fresnel } => {
                 *alpha = (*alpha * rough * rough).clamp(0.0, 1.0);
                 if let ConductorFresnel::Schlick { reflectance } = fresnel {
@@ -266,6 +279,14 @@ pub enum MaterialKind {
     Diffuse {
         /// Albedo, 0…1.
         reflectance: Vec3,
+    },
+    /// Thin sheet that scatters light to both of its sides, as leaves, curtains and lampshades do:
+    /// share / π on each, the same from either.
+    DiffuseTransmission {
+        /// Share that stays on the side from which light comes, 0…1.
+        reflectance: Vec3,
+        /// Share that leaves on the other side; with `reflectance` at most 1, or a factor of a texture.
+        transmittance: Vec3,
     },
     /// GGX dielectric coat over a diffuse base.
     Plastic {

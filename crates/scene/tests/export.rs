@@ -161,6 +161,43 @@ fn gltf_keeps_dielectrics_cutoffs_and_skies() {
     assert_eq!(used, expected.map(|name| format!("KHR_{name}")));
 }
 
+/// Light of both sides of a sheet comes back, one colour and an image as well.
+#[test]
+fn sheets_come_back() {
+    let folder = Folder::new();
+    let transmittance = Vec3::new(0.5, 0.25, 0.125);
+    for (reflectance, factor) in [
+        ("[0.25, 0.5, 0.125]", Vec3::new(0.25, 0.5, 0.125)),
+        (
+            "{ texture = \"a.png\", linear = true, factor = [0.25, 0.5, 0.125] }",
+            Vec3::new(0.25, 0.5, 0.125),
+        ),
+    ] {
+        let clay = format!(
+            "type = \"diffuse_transmission\"\nreflectance = {reflectance}\n\
+             transmittance = [0.5, 0.25, 0.125]"
+        );
+        let scene = square(&folder, &clay);
+        let image = |scene: &Scene| {
+            let color = &scene.materials[0].surface.color;
+            color.as_ref().map_or(Vec3::ONE, |used| Vec3::from(used.mean()))
+        };
+        let mean = image(&scene);
+        for (warnings, read) in again(&folder, &scene) {
+            assert_eq!(warnings, [""; 0]);
+            let MaterialKind::DiffuseTransmission { reflectance: own, transmittance: other } =
+                read.materials[0].kind
+            else {
+                panic!("{:?}", read.materials[0])
+            };
+            for (found, expected) in [(own, factor), (other, transmittance)] {
+                let [found, expected] = [found * image(&read), expected * mean];
+                assert!(found.abs_diff_eq(expected, 3e-3), "{found}, not {expected}");
+            }
+        }
+    }
+}
+
 #[test]
 fn mirrors_and_coats_come_back_from_pbrt() {
     let folder = Folder::new();

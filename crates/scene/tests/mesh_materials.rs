@@ -162,6 +162,20 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
     let (found, warnings) = with(&glass.replace("Factor\": 1", "Factor\": 0.4"), smooth);
     assert!(matches!(found.kind, MaterialKind::Principled(_)) && warnings.len() == 1);
 
+    let sheet = r#""KHR_materials_diffuse_transmission": {"diffuseTransmissionFactor": 0.25,
+        "diffuseTransmissionColorFactor": [0.4, 0.8, 1]}"#;
+    let (found, warnings) = with(sheet, &smooth.replace("Factor\": 0,", "Factor\": 0.5,"));
+    let MaterialKind::DiffuseTransmission { reflectance, transmittance } = found.kind else {
+        panic!("{found:?}")
+    };
+    assert_eq!(reflectance, 0.5 * 0.75 * Vec3::new(0.9, 1.0, 1.0));
+    assert_eq!(transmittance, 0.5 * 0.25 * Vec3::new(0.4, 0.8, 1.0));
+    assert!(warnings.len() == 1 && warnings[0].contains("ignored gloss, metal"), "{warnings:?}");
+    // A metal has no such light, and glass stays glass.
+    assert!(matches!(with(sheet, "").0.kind, MaterialKind::Principled(_)));
+    let both = with(&format!("{sheet}, {glass}"), smooth).0;
+    assert!(matches!(both.kind, MaterialKind::ThinDielectric { .. }), "{both:?}");
+
     let unlit = r#""KHR_materials_unlit": {}"#;
     let (found, warnings) = with(unlit, r#""baseColorFactor": [0.2, 0.4, 0.6, 1]"#);
     assert!(warnings.is_empty(), "{warnings:?}");

@@ -258,6 +258,23 @@ fn models_become_materials() {
         material(r##"<bsdf type="diffuse"><srgb name="reflectance" value="#ff8000"/></bsdf>"##);
     let MaterialKind::Diffuse { reflectance } = paint.kind else { panic!() };
     assert_close(reflectance, Vec3::new(1.0, 0.2158605, 0.0));
+    let sides = |text: &str| {
+        let (sheet, warnings) = material(text);
+        let MaterialKind::DiffuseTransmission { reflectance, transmittance } = sheet.kind else {
+            panic!("{sheet:?}")
+        };
+        assert!(sheet.surface.two_sided);
+        (reflectance, transmittance, warnings.len())
+    };
+    let rgb = r#"value="0.2,0.4,0.8"/>"#;
+    let color = Vec3::new(0.2, 0.4, 0.8);
+    let older = format!(r#"<bsdf type="difftrans"><rgb name="transmittance" {rgb}</bsdf>"#);
+    assert_eq!(sides(&older), (Vec3::ZERO, color, 0));
+    let thin = format!(
+        r#"<bsdf type="principledthin"><rgb name="base_color" {rgb}
+           <float name="diff_trans" value="1.5"/><float name="eta" value="1.3"/></bsdf>"#
+    );
+    assert_eq!(sides(&thin), (0.25 * color, 0.75 * color, 1));
     let (copper, warnings) = material(
         r#"<bsdf type="twosided"><bsdf type="roughconductor"><string name="material" value="Cu"/>
         <float name="alphaU" value="0.1"/><float name="alphaV" value="0.3"/></bsdf></bsdf>"#,

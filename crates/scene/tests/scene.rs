@@ -276,8 +276,14 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
     );
     case(
         &HEAD.replace("\"diffuse\"", "\"metal\""),
-        "room.toml:12:8: unknown material type `metal`, expected one of `diffuse`, `plastic`, \
-         `conductor`, `principled`, `mirror`, `dielectric`, `thin_dielectric`, `measured`",
+        "room.toml:12:8: unknown material type `metal`, expected one of `diffuse`, \
+         `diffuse_transmission`, `plastic`, `conductor`, `principled`, `mirror`, `dielectric`, \
+         `thin_dielectric`, `measured`",
+    );
+    let bright = "\"diffuse_transmission\"\ntransmittance = [0.25, 0.75, 0.5]";
+    case(
+        &HEAD.replace("\"diffuse\"", bright),
+        "reflectance and transmittance: expected a sum of at most 1, found 1.25",
     );
     case(
         &HEAD.replace("reflectance", "color"),

@@ -46,6 +46,7 @@ fn default_two_sided() -> bool {
 #[derive(Clone, Debug)]
 pub(crate) enum MaterialKindEntry {
     Diffuse(DiffuseEntry),
+    DiffuseTransmission(DiffuseTransmissionEntry),
     Plastic(PlasticEntry),
     Conductor(ConductorEntry),
     Principled(PrincipledEntry),
@@ -60,6 +61,15 @@ pub(crate) enum MaterialKindEntry {
 pub(crate) struct DiffuseEntry {
     /// Albedo, 0…1.
     pub reflectance: Textured<[f32; 3]>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DiffuseTransmissionEntry {
+    /// Share that stays on the side from which light comes, 0…1.
+    pub reflectance: Textured<[f32; 3]>,
+    /// Share that leaves on the other; both together at most 1. A texture is a factor of both.
+    pub transmittance: [f32; 3],
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -183,6 +193,9 @@ impl MaterialEntry {
         let keys = &self.keys;
         let (color, roughness, metallic) = match &self.kind {
             MaterialKindEntry::Diffuse(entry) => (entry.reflectance.texture(), None, None),
+            MaterialKindEntry::DiffuseTransmission(entry) => {
+                (entry.reflectance.texture(), None, None)
+            }
             MaterialKindEntry::Plastic(entry) => (entry.diffuse.texture(), None, None),
             MaterialKindEntry::Conductor(entry) => (
                 entry.reflectance.as_ref().and_then(Textured::texture),

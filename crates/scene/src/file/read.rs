@@ -141,6 +141,9 @@ type Kinds<T> = [(&'static str, fn(KindTable, &str) -> Result<T, TextError>)];
 
 const MATERIALS: &Kinds<MaterialKindEntry> = &[
     ("diffuse", |rest, owner| Ok(MaterialKindEntry::Diffuse(rest.read(owner)?))),
+    ("diffuse_transmission", |rest, owner| {
+        Ok(MaterialKindEntry::DiffuseTransmission(rest.read(owner)?))
+    }),
     ("plastic", |rest, owner| Ok(MaterialKindEntry::Plastic(rest.read(owner)?))),
     ("conductor", |rest, owner| Ok(MaterialKindEntry::Conductor(rest.read(owner)?))),
     ("principled", |rest, owner| Ok(MaterialKindEntry::Principled(rest.read(owner)?))),

@@ -83,8 +83,8 @@ fn blend(
     Some((MaterialKind::Diffuse { reflectance }, surface))
 }
 
-/// Mixes the diffuse and the specular reflection of two materials; none if one is glass or measured, or
-/// their surfaces differ in opacity.
+/// Mixes the diffuse and the specular reflection of two materials; none if one lets light through or is
+/// measured, or their surfaces differ in opacity.
 ///
 /// The gloss becomes one lobe. Images that lie as the first of them count texel by texel, others by their
 /// means.
@@ -186,6 +186,7 @@ impl Lobes {
             }
             MaterialKind::Dielectric { .. }
             | MaterialKind::ThinDielectric { .. }
+            | MaterialKind::DiffuseTransmission { .. }
             | MaterialKind::Measured { .. } => return None,
         })
     }

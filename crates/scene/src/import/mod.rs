@@ -14,7 +14,7 @@ use crate::{
     Asked, EnvironmentMap, FilmSettings, Geometry, Lamp,
     features::{Feature, Ignored},
     file::CameraEntry,
-    material::Material,
+    material::{Material, MaterialKind},
     texture::{
         TextureUse,
         texelwise::{Texelwise, lie_alike},
@@ -114,7 +114,40 @@ impl Value {
         };
         (combined, any_mean)
     }
+
+    fn mean(&self) -> Vec3 {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Image(image) => image.mean().into(),
+        }
+    }
 }
+
+/// Sheet that scatters light to both sides: its kind, and the texture of all that it scatters, which both
+/// sides share by their means. The last part tells whether that loses anything.
+pub(crate) fn sheet(sides: [Value; 2]) -> (MaterialKind, Option<TextureUse>, bool) {
+    let [reflectance, transmittance] = sides.each_ref().map(Value::mean);
+    let (all, any_mean) =
+        Value::combined(sides.clone(), |[reflected, transmitted]| reflected + transmitted);
+    let Value::Image(all) = all else {
+        return (MaterialKind::DiffuseTransmission { reflectance, transmittance }, None, false);
+    };
+    let (unlike, _) = Value::combined(sides, |[reflected, transmitted]| {
+        (reflected * transmittance - transmitted * reflectance).abs()
+    });
+    let is_unlike = |image: &TextureUse| {
+        image.values().iter().any(|value| Vec3::from_slice(value).max_element() > SAME_SIDES)
+    };
+    let whole = (reflectance + transmittance).max(Vec3::splat(f32::MIN_POSITIVE));
+    let kind = MaterialKind::DiffuseTransmission {
+        reflectance: reflectance / whole,
+        transmittance: transmittance / whole,
+    };
+    (kind, Some(all), any_mean || unlike.image().is_some_and(is_unlike))
+}
+
+/// Largest difference of two sides, each weighed by the mean of the other, that is rounding.
+const SAME_SIDES: f32 = 0.01;
 
 /// Largest change of a channel that is no loss of colour.
 const ROUNDING: f64 = 1e-3;

@@ -135,6 +135,16 @@ impl Reader<'_> {
             MaterialKindEntry::Diffuse(entry) => MaterialKind::Diffuse {
                 reflectance: self.share("reflectance", &entry.reflectance)?,
             },
+            MaterialKindEntry::DiffuseTransmission(entry) => {
+                let reflectance = self.share("reflectance", &entry.reflectance)?;
+                let transmittance = self.vector("transmittance", entry.transmittance, SHARE)?;
+                let most = (reflectance + transmittance).max_element();
+                let message = format!(
+                    "reflectance and transmittance: expected a sum of at most 1, found {most}"
+                );
+                self.check(most < 1.0 + 1e-5, &message)?;
+                MaterialKind::DiffuseTransmission { reflectance, transmittance }
+            }
             MaterialKindEntry::Mirror(entry) => {
                 MaterialKind::Mirror { reflectance: self.share("reflectance", &entry.reflectance)? }
             }

@@ -39,6 +39,16 @@ pub(super) fn colored(value: Value, kind: impl FnOnce(Vec3) -> MaterialKind) -> 
     model
 }
 
+/// Sheet that scatters `value`, of which the share `transmitted` leaves on the other side.
+fn sheet(value: Value, transmitted: f32) -> Material {
+    let mut model = colored(value, |all| MaterialKind::DiffuseTransmission {
+        reflectance: (1.0 - transmitted) * all,
+        transmittance: transmitted * all,
+    });
+    model.surface.two_sided = true;
+    model
+}
+
 /// Material of a shape that names none.
 pub(super) fn default_of_shapes() -> Material {
     let kind = MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) };
@@ -81,9 +91,8 @@ impl Reader {
                 colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
             }
             "difftrans" => {
-                self.ignored.add(features::MI_DIFFUSE_TRANSMISSION, || node.place());
                 let value = self.value_or(&parameters, "transmittance", Role::Reflectance, 0.5)?;
-                colored(value, |reflectance| MaterialKind::Diffuse { reflectance })
+                sheet(value, 1.0)
             }
             "phong" | "ward" => self.phong(&parameters)?,
             "plastic" => self.plastic(&parameters, None)?,
@@ -110,6 +119,17 @@ impl Reader {
             }
             "thindielectric" => self.dielectric(&parameters, None)?,
             "principled" => self.principled(&parameters)?,
+            "principledthin" => {
+                self.ignored.add(features::MI_PRINCIPLED_THIN, || node.place());
+                parameters.without_effect(
+                    "roughness anisotropic spec_trans eta spec_tint sheen sheen_tint flatness \
+                     diffuse_reflectance_sampling_rate",
+                );
+                let base = self.value_or(&parameters, "base_color", Role::Reflectance, 0.5)?;
+                let transmitted = self.value_or(&parameters, "diff_trans", Role::Index, 0.0)?;
+                // All of it where that is 2.
+                sheet(base, 0.5 * luminance(transmitted.mean()).clamp(0.0, 2.0))
+            }
             "measured" => self.measured(&parameters)?,
             found => {
                 let name = format!("reflection model `{found}`, which is diffuse of 0.5");

@@ -13,7 +13,7 @@ use crate::{
     coat::{COAT_IOR, albedo_below_coat},
     error::Result,
     features,
-    import::{SOLID_IOR, Value, Width, blend::mixed, media, relief::Reliefs},
+    import::{SOLID_IOR, Value, Width, blend::mixed, media, relief::Reliefs, sheet},
     material::{ConductorFresnel, Material, MaterialKind, Surface},
     measured::MeasuredFiles,
 };
@@ -100,10 +100,17 @@ impl<'a> Materials<'a> {
                 transmittance: Vec3::ONE,
             },
             "diffusetransmission" => {
-                self.textures.log.ignore(features::PBRT_TRANSMISSION, &entity.place);
-                self.textures.spectrum(entity, "transmittance")?;
                 let scale = entity.number("scale", 1.0)? as f32;
-                self.diffuse(entity, "reflectance", 0.25, scale, &mut surface)?
+                let mut side = |name: &str| {
+                    let value = self.textures.spectrum(entity, name)?;
+                    Ok(value.unwrap_or(Value::number(0.25)).scaled(scale))
+                };
+                let (kind, color, is_mean) = sheet([side("reflectance")?, side("transmittance")?]);
+                surface.color = color;
+                if is_mean {
+                    self.textures.log.ignore(features::PBRT_TRANSMISSION, &entity.place);
+                }
+                kind
             }
             "subsurface" => {
                 self.textures.log.ignore(features::PBRT_SUBSURFACE, &entity.place);

@@ -85,6 +85,21 @@ impl<'a> Translator<'a> {
         let metal = |base_color, alpha: f32| core(base_color, 1.0, alpha.sqrt());
         match &self.subject.material.kind {
             MaterialKind::Diffuse { reflectance } => self.diffuse(*reflectance),
+            MaterialKind::DiffuseTransmission { reflectance, transmittance } => {
+                let (kept, passed) = (reflectance.max_element(), transmittance.max_element());
+                let share = if passed > 0.0 { passed / (kept + passed) } else { 0.0 };
+                let color = (*transmittance / share.max(f32::MIN_POSITIVE)).min(Vec3::ONE);
+                let mut sheet = json!({"diffuseTransmissionFactor": share});
+                let texture = self.subject.surface.color.as_ref();
+                let largest = peak(texture);
+                sheet["diffuseTransmissionColorFactor"] =
+                    json!((color * largest).min(Vec3::ONE).to_array());
+                if let Some(info) = self.texture(Layout::ColorOpacity(largest), [texture, None]) {
+                    sheet["diffuseTransmissionColorTexture"] = info;
+                }
+                self.extension("KHR_materials_diffuse_transmission", sheet);
+                self.diffuse((*reflectance / (1.0 - share).max(f32::MIN_POSITIVE)).min(Vec3::ONE))
+            }
             MaterialKind::Plastic { diffuse, alpha, ior } => {
                 self.subject.warn(
                     "its coat and base become glTF's dielectric, which reflects by Schlick's \

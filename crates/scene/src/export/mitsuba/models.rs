@@ -91,6 +91,10 @@ impl Translator<'_> {
             MaterialKind::Diffuse { reflectance } => {
                 element("diffuse", &self.color("reflectance", *reflectance))
             }
+            MaterialKind::DiffuseTransmission { reflectance, .. } => {
+                self.subject.warn("Mitsuba has no sheet that scatters light through: it is lost");
+                element("diffuse", &self.color("reflectance", *reflectance))
+            }
             MaterialKind::Plastic { diffuse, alpha, ior } => {
                 self.warn_of_masking(*alpha, "plastic");
                 let base = self.plastic_base(*diffuse, *alpha, *ior);

@@ -94,6 +94,11 @@ impl<'a> Translator<'a> {
             MaterialKind::Diffuse { reflectance } => {
                 ("diffuse", self.color("reflectance", *reflectance))
             }
+            MaterialKind::DiffuseTransmission { reflectance, transmittance } => {
+                let sides = self.color("reflectance", *reflectance)
+                    + &self.color("transmittance", *transmittance);
+                ("diffusetransmission", sides)
+            }
             MaterialKind::Plastic { diffuse, alpha, ior } => {
                 self.coated(*diffuse, *alpha, *ior, "its coat and base")
             }

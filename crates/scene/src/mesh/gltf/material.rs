@@ -9,6 +9,7 @@ use crate::{
     error::Result,
     features::{self, Feature, Ignored},
     gloss::{DEFAULT_IOR, DIELECTRIC, metallic_roughness},
+    import,
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
     mesh::{MeshMaterial, images::opacity_of, label},
     texture::{Channels, Encoding, TextureUse, texelwise::lie_alike},
@@ -24,6 +25,8 @@ const VECTOR: (Channels, Encoding) = (Channels::Color, Encoding::Linear);
 
 /// Transmitted share from which a surface is glass; there is no mixture of glass and others.
 const GLASS: f32 = 0.5;
+/// Share of light scattered through from which a surface is a sheet.
+const LEAST_TRANSMISSION: f32 = 1e-3;
 /// Roughness from which a thin pane, which is always smooth, is worth a warning.
 const VISIBLE_ROUGHNESS: f32 = 0.05;
 /// Largest reflectance at normal incidence of a material that is read as a dielectric.
@@ -185,6 +188,7 @@ impl GltfReader<'_> {
             reflection = unlit(reflection);
         } else {
             self.transmission(&mut reading, &mut reflection, is_glass)?;
+            self.diffuse_transmission(&mut reading, &mut reflection)?;
             let normal = &json["normalTexture"];
             reflection.surface.normal = self.texture(normal, VECTOR, &mut reading)?;
             reflection.surface.normal_scale = number(normal, "scale", 1.0);
@@ -353,6 +357,53 @@ impl GltfReader<'_> {
             found.surface.roughness = None;
             MaterialKind::ThinDielectric { ior, reflectance, transmittance: tint }
         };
+        Ok(())
+    }
+
+    /// Turns a surface that is no glass into a sheet, where it scatters light to its other side.
+    fn diffuse_transmission(
+        &mut self,
+        reading: &mut Reading,
+        found: &mut Reflection,
+    ) -> Result<()> {
+        let json = reading.json;
+        let model = &json["extensions"]["KHR_materials_diffuse_transmission"];
+        let MaterialKind::Principled(Principled { base_color, metallic, specular, .. }) =
+            found.kind
+        else {
+            return Ok(());
+        };
+        let metal = found.surface.metallic.as_ref().map_or(1.0, |texture| texture.mean()[0]);
+        let factor = share(model, "diffuseTransmissionFactor", 0.0);
+        let below = 1.0 - metallic * metal;
+        if factor * below < LEAST_TRANSMISSION {
+            return Ok(());
+        }
+        let of_image = |image: Option<TextureUse>, factor: Vec3| {
+            let whole = image.map_or(import::Value::Constant(Vec3::ONE), import::Value::Image);
+            whole.affine(factor, Vec3::ZERO)
+        };
+        let through = self.texture(&model["diffuseTransmissionTexture"], ALPHA, reading)?;
+        let tint = self.texture(&model["diffuseTransmissionColorTexture"], COLOR, reading)?;
+        let tint_factor = color(model, "diffuseTransmissionColorFactor", [1.0; 3]);
+        let through = of_image(through, Vec3::splat(factor));
+        let base = of_image(found.surface.color.take(), below * base_color);
+        let tint = of_image(tint, below * tint_factor);
+        let (reflected, is_mean) =
+            import::Value::combined([base, through.clone()], |[base, through]| {
+                base * (1.0 - through)
+            });
+        let (transmitted, is_tint_mean) =
+            import::Value::combined([tint, through], |[tint, through]| tint * through);
+        let (kind, image, is_ratio_mean) = import::sheet([reflected, transmitted]);
+        let has_volume = !json["extensions"]["KHR_materials_volume"].is_null();
+        let is_bare = specular == 0.0 && below == 1.0 && !has_volume;
+        let has_own_pattern = is_mean || is_tint_mean || is_ratio_mean;
+        reading.ignore_if(!is_bare || has_own_pattern, features::GLTF_SHEET);
+        found.kind = kind;
+        found.surface.color = image;
+        found.surface.roughness = None;
+        found.surface.metallic = None;
         Ok(())
     }
 
