@@ -296,7 +296,6 @@ fn every_range_is_named_where_it_is_left() {
         ("record-pixels", ["0", "257"], "1 to 256"),
         ("environment-tiles", ["7", "1025"], "8 to 1024"),
         ("pilot-samples", ["0", "65"], "1 to 64"),
-        ("sector-jitter", ["", "1"], "on or off"),
         ("sector-pixels", ["0", "257"], "1 to 256"),
         ("tile-floor", ["0", "1.01"], "0.001 to 1"),
         ("regions", ["15", "1025"], "16 to 1024"),

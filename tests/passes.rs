@@ -198,7 +198,7 @@ fn shown() -> Vec<(&'static str, Vec<Dispatch>)> {
     let grid = RecordGrid { side: 16, edge_per_distance: 0.1, largest_edge: 1.0 };
     let controlled = control_variates::steps(&parameters, grid, surfaces).unwrap();
     let of_records = control_variates::pilot_steps(&parameters, grid, surfaces).unwrap();
-    let tiles = |learns| tiles::steps(&parameters.tiles, 1, learns, surfaces);
+    let tiles = |learns| tiles::steps(1, learns, surfaces);
     let of_rays = [
         ("portal", portal::steps(&parameters, 1, surfaces), wave(0, 1)),
         ("control-variates", controlled, wave(0, 1)),

@@ -19,7 +19,7 @@ use fenestra::{
         pilot::Tables,
         rays::RaySteps,
         regions::Partition,
-        tiles::{self, Entry, SectorGrid, TileBuffers, TileCache, TilesParameters},
+        tiles::{self, Entry, SectorGrid, TileBuffers, TileCache},
     },
     scene::{
         Geometry, Scene,
@@ -215,7 +215,6 @@ fn samples_follow_the_density_which_integrates_to_one() {
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Query {
     position: [f32; 3],
-    shift: [f32; 2],
     direction: [f32; 3],
     sector: u32,
     bits: [u32; 2],
@@ -269,9 +268,8 @@ impl Cache {
             camera_forward: forward.into(),
             ..SceneParameters::default()
         };
-        let own = TilesParameters { sector_jitter: false, ..TilesParameters::default() };
         let tiles = cache.tiles() as u32;
-        let steps = tiles::steps(&own, cache.tiles(), false, scene_buffers.surfaces());
+        let steps = tiles::steps(cache.tiles(), false, scene_buffers.surfaces());
         let buffers = TileBuffers::new(device, &partition, GRID, cache).unwrap();
         buffers.upload(&entries).unwrap();
         Self { scene, partition, entries, buffers, scene_buffers, parameters, steps, tiles }
@@ -306,7 +304,6 @@ fn the_shader_agrees() {
             let [a, b, ..] = word(0);
             Query {
                 position: (20.0 * number(1)).into(),
-                shift: number(2).truncate().into(),
                 direction: number(3).normalize().into(),
                 sector: query % GRID.sectors() as u32,
                 bits: [a, b],
@@ -317,8 +314,8 @@ fn the_shader_agrees() {
         queries[0].position = cache.parameters.camera_position;
         let (mut sectors, mut pdfs, mut draws) = (0, 0, 0);
         for (query, answer) in queries.iter().zip(cache.probe(&queries)) {
-            let (position, shift) = (query.position.into(), query.shift.into());
-            let sector = sector_of(GRID, &cache.parameters, position, shift);
+            let position = query.position.into();
+            let sector = sector_of(GRID, &cache.parameters, position);
             let density = cache.density(&tables, query.sector);
             let drawn = density.sample(query.bits, query.more_bits);
             let is_same = drawn.direction.distance(answer.direction.into()) < 1e-3
@@ -385,7 +382,7 @@ fn rays_follow_the_density_that_they_are_divided_by() {
         let tables = EnvironmentTables::new(&cache.scene.environment);
         let brdfs = MaterialTables::new(&cache.scene.materials).unwrap();
         // The product_state probe puts all paths at the origin.
-        let sector = sector_of(GRID, &cache.parameters, Vec3::ZERO, Vec2::ZERO);
+        let sector = sector_of(GRID, &cache.parameters, Vec3::ZERO);
         let density = cache.density(&tables, sector);
         of_states.push([0, 1, 2, 3].map(|material: usize| {
             let name = format!("material {material}, learned {is_learned}");
@@ -460,7 +457,7 @@ fn parameters_change_no_image() {
     let reference = replicates::replicates(&scene, &mis, 40, 16);
     let cases: [&[&str]; 3] = [
         &["environment-tiles=8", "sector-pixels=1", "tile-floor=0.001", "pilot-samples=2"],
-        &["environment-tiles=1024", "sector-jitter=on", "pilot-samples=1"],
+        &["environment-tiles=1024", "pilot-samples=1"],
         &["sector-pixels=256", "compensation=off", "pilot-samples=1"],
     ];
     for (case, assignments) in cases.into_iter().enumerate() {

@@ -6,7 +6,6 @@
 
 struct TileQuery {
     vec3 position;
-    vec2 shift;
     vec3 direction;
     uint sector;
     uvec2 bits;
@@ -25,7 +24,7 @@ TileAnswer answer(TileQuery query) {
     float map_pdf = environment_pdf(query.direction, environment_light(query.direction));
     EnvironmentSample light = draw_from_tiles(query.sector, query.bits, query.more_bits);
     return TileAnswer(
-        sector_of(query.position, query.shift), tiles_pdf(query.sector, query.direction, map_pdf),
+        sector_of(query.position), tiles_pdf(query.sector, query.direction, map_pdf),
         light.direction, light.radiance, light.pdf);
 }
 

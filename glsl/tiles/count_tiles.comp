@@ -16,7 +16,7 @@ void count_ray(ListedRay listed) {
         return;
     }
     ShadowRay ray = load_shadow_ray(listed.ray);
-    uint entry = sector_of(hit.position, vec2(0.0)) * TILES + tile_of(ray.direction);
+    uint entry = sector_of(hit.position) * TILES + tile_of(ray.direction);
     atomicAdd(tile_counts[2u * entry], 1u);
     // Same test as in shadow.comp: rays without a contribution are not traced.
     if (ray.contribution != vec3(0.0) && visibility[listed.ray] != 0u) {

@@ -1,31 +1,18 @@
 // Chooses directions at every hit of the wave from the BRDF and from tiles of the environment, and writes
 // one shadow ray for each by the density of both: the balance heuristic of `mis`. Densities are in solid
 // angle measure.
-//
-// With `sector-jitter=on` a hit reads a sector at random among those around it. The choice knows no
-// direction, and all rays of the hit have the density of that sector, so no bias comes of it.
 #version 460
 
 #include "mis_rays.glsl"
 #include "path_list.glsl"
 #include "tiles/tiles.glsl"
 
-layout(constant_id = CONSTANT_SECTOR_JITTER) const bool SECTOR_JITTER = false;
 // True in the pilot, which learns from rays through tiles alone.
 layout(constant_id = CONSTANT_TILES_LEARN) const bool LEARNS = false;
 
 // Offsets from the first dimension of a vertex.
-const uint DIMENSION_SECTOR = 6u;
 const uint DIMENSION_TILE = 24u;
 const uint DIMENSION_TILE_PATCH = 25u;
-
-uint sector_at(Vertex vertex) {
-    uvec4 bits = hash_4d(uvec4(
-        vertex.index.pixel, vertex.index.sample_index, vertex.dimension + DIMENSION_SECTOR,
-        wave.seed));
-    vec2 shift = SECTOR_JITTER ? vec2(unit_float(bits.x), unit_float(bits.y)) - 0.5 : vec2(0.0);
-    return sector_of(vertex.hit.position, shift);
-}
 
 DirectionSample draw_tile(Vertex vertex, uint sector, uint index) {
     uint pixel = vertex.index.pixel;
@@ -43,7 +30,7 @@ DirectionSample draw_brdf(Vertex vertex, uint sector, uint index) {
 }
 
 void sample_vertex(uint path, Vertex vertex) {
-    uint sector = sector_at(vertex);
+    uint sector = sector_of(vertex.hit.position);
     uint share = LEARNS ? 0u : mis_share(wave.total_shadow_rays, wave.bounce_rays);
     WRITE_MIS_RAYS(
         path, vertex, share, draw_tile(vertex, sector, index), draw_brdf(vertex, sector, index))

@@ -15,9 +15,9 @@ uint sector_side() {
     return uint(sqrt(float(uint(textureSize(tile_entries)) / TILES)) + 0.5);
 }
 
-// Sector of a place as seen from the camera, moved by `shift` sectors. All sectors have the same solid angle;
+// Sector of a place as seen from the camera. All sectors have the same solid angle;
 // the square of directions has its middle at the view axis, and its seam behind the camera.
-uint sector_of(vec3 position, vec2 shift) {
+uint sector_of(vec3 position) {
     vec3 away = position - parameters.camera_position;
     float far = length(away);
     vec3 direction = far > 0.0 ? away / far : parameters.camera_forward;
@@ -25,7 +25,7 @@ uint sector_of(vec3 position, vec2 shift) {
         dot(direction, parameters.camera_right), dot(direction, parameters.camera_up),
         dot(direction, parameters.camera_forward)));
     uint side = sector_side();
-    vec2 place = clamp(at * float(side) + shift, 0.0, float(side - 1u));
+    vec2 place = clamp(at * float(side), 0.0, float(side - 1u));
     return uint(place.y) * side + uint(place.x);
 }
 

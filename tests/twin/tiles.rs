@@ -54,8 +54,8 @@ impl TileDensity<'_> {
     }
 }
 
-/// Sector of a place as `camera` sees it, moved by `shift` sectors.
-pub fn sector_of(grid: SectorGrid, camera: &SceneParameters, position: Vec3, shift: Vec2) -> u32 {
+/// Sector of a place as `camera` sees it.
+pub fn sector_of(grid: SectorGrid, camera: &SceneParameters, position: Vec3) -> u32 {
     let [right, up, forward] =
         [camera.camera_right, camera.camera_up, camera.camera_forward].map(Vec3::from);
     let away = position - Vec3::from(camera.camera_position);
@@ -67,6 +67,6 @@ pub fn sector_of(grid: SectorGrid, camera: &SceneParameters, position: Vec3, shi
         direction.dot(forward),
     ));
     let last = Vec2::splat((grid.side - 1) as f32);
-    let place = (at * grid.side as f32 + shift).clamp(Vec2::ZERO, last);
+    let place = (at * grid.side as f32).clamp(Vec2::ZERO, last);
     place.y as u32 * grid.side + place.x as u32
 }

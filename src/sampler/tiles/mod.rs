@@ -14,8 +14,7 @@
 //! - Choice: a sector counts squared cosines of visible rays, so that tiles below the horizon lose too, and
 //!   probabilities leave least variance; theirs add up luminance.
 //! - Choice: the pilot draws tiles half by flux and half alike, from the vertices of its paths.
-//! - Choice: sectors with few rays lean on their surroundings. With `sector-jitter=on` a hit reads a sector
-//!   at random among those around it; the density is that of the sector it has read.
+//! - Choice: sectors with few rays lean on their surroundings.
 //! - Choice: what is dim or hardly seen is left to the BRDF, by subtracting a part of the mean. One of
 //!   theirs can do so too.
 //! - Choice: a share of the probability follows the map alone, so that no tile with light is lost.
@@ -39,7 +38,7 @@ use super::{
 use crate::{
     error::Result,
     pass::{Surfaces, Technique},
-    shader::rooms::tiles::{CONSTANT_SECTOR_JITTER, CONSTANT_TILES, CONSTANT_TILES_LEARN},
+    shader::rooms::tiles::{CONSTANT_TILES, CONSTANT_TILES_LEARN},
 };
 
 pub(super) struct TilesRoom;
@@ -59,7 +58,7 @@ impl Room for TilesRoom {
         let cache = TileCache::new(&partition, own.tile_floor, parameters.compensation);
         let grid = SectorGrid::new(scene, own, cache.tiles());
         let surfaces = runner.settings().surfaces;
-        let steps = [true, false].map(|learns| steps(own, cache.tiles(), learns, surfaces));
+        let steps = [true, false].map(|learns| steps(cache.tiles(), learns, surfaces));
         let buffers = TileBuffers::new(runner.device(), &partition, grid, cache)?;
         let ms = start.elapsed().as_secs_f64() * 1e3;
         let prepare_ms = [("environment tiles".to_owned(), ms)].into();
@@ -68,13 +67,9 @@ impl Room for TilesRoom {
 }
 
 /// Returns the steps of the picture, or of the pilot, which `learns`, for so many tiles.
-pub fn steps(own: &TilesParameters, tiles: usize, learns: bool, surfaces: Surfaces) -> RaySteps {
+pub fn steps(tiles: usize, learns: bool, surfaces: Surfaces) -> RaySteps {
     let tiles = (CONSTANT_TILES, tiles as u32);
-    let constants = [
-        tiles,
-        (CONSTANT_SECTOR_JITTER, u32::from(own.sector_jitter)),
-        (CONSTANT_TILES_LEARN, u32::from(learns)),
-    ];
+    let constants = [tiles, (CONSTANT_TILES_LEARN, u32::from(learns))];
     let steps = RaySteps::new("sample_tiles", &constants, surfaces);
     if learns { steps.learning("count_tiles", &[tiles]) } else { steps }
 }

@@ -1,9 +1,6 @@
 //! Parameters of `tiles`.
 
-use crate::sampler::{
-    knob::{ON_OR_OFF, parameters},
-    regions::MAX_REGIONS,
-};
+use crate::sampler::{knob::parameters, regions::MAX_REGIONS};
 
 parameters! {
     /// Parameters of `tiles`.
@@ -12,8 +9,6 @@ parameters! {
         "environment-tiles" environment_tiles: u32 = 128, 8..=MAX_REGIONS as u32;
         /// `pilot-samples`: samples of every pixel that the cache learns from.
         "pilot-samples" pilot_samples: u32 = 8, 1..=64;
-        /// `sector-jitter`: on if a hit reads a sector at random among those around it.
-        "sector-jitter" sector_jitter: bool = false, ON_OR_OFF;
         /// `sector-pixels`: width of a sector at the centre of the picture, pixels.
         "sector-pixels" sector_pixels: u32 = 8, 1..=256;
         /// `tile-floor`: share of the probability that follows the map alone.

@@ -4,8 +4,6 @@ room! {
     specializations {
         /// Number of tiles of the environment.
         CONSTANT_TILES;
-        /// 1 reads a sector at random among those around a hit, 0 the hit's own.
-        CONSTANT_SECTOR_JITTER;
         /// 1 draws all rays through tiles, for the pilot to learn from.
         CONSTANT_TILES_LEARN;
     }
