@@ -146,12 +146,11 @@ features! {
     MI_PHONG "`phong` and `ward`" "a metallic-roughness material of the same colours";
     MI_POLARIZED "polarisation of `pplastic`" "as `roughplastic`";
     MI_COATING "`coating` of other models than `diffuse`" "left out";
-    MI_PRINCIPLED_THIN "gloss and clear part of `principledthin`" "left out";
     MI_WEIGHTS "sum of `weights` of `mixturebsdf` other than 1" "their ratios count";
     MI_TWO_MODELS "second model of `twosided`" "the first is on both sides";
     MI_SPEC_TRANS "`spec_trans` between 0 and 1"
         "from ½ a rough dielectric, below none of it; as is a metal";
-    MI_PRINCIPLED_REST "further parameters of `principled`, by name" "";
+    MI_PRINCIPLED_REST "further parameters of `principled` and `principledthin`, by name" "";
     MI_BLEND_LOBES "gloss of `blendbsdf` and `mixturebsdf`"
         "one lobe of the mean roughness; images on other coordinates than the first count by their means";
     MI_BLEND "the lesser part of `blendbsdf` and `mixturebsdf` with glass or a sheet"

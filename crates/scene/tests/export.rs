@@ -7,6 +7,7 @@ use fenestra_scene::{
     export::{Settings, gltf, mitsuba, pbrt},
     load::LoadOptions,
     material::MaterialKind,
+    math::colour::luminance,
     texture::{Texels, Texture, TextureUse, Wrap},
 };
 use glam::{Vec2, Vec3};
@@ -183,6 +184,20 @@ fn sheets_come_back() {
             color.as_ref().map_or(Vec3::ONE, |used| Vec3::from(used.mean()))
         };
         let mean = image(&scene);
+        // Mitsuba keeps the sum of both sides and the ratio of their luminances.
+        let path = folder.path().join("a.xml");
+        mitsuba::export(&scene, &path, SETTINGS).write().unwrap();
+        let sheet = Scene::load(&path).unwrap();
+        let MaterialKind::DiffuseTransmission { reflectance: own, transmittance: other } =
+            sheet.materials[0].kind
+        else {
+            panic!("{:?}", sheet.materials[0])
+        };
+        let all = (own + other) * image(&sheet);
+        assert!(all.abs_diff_eq((factor + transmittance) * mean, 3e-3), "{all}");
+        let [found, expected] = [(own, other), (factor, transmittance)]
+            .map(|(own, other)| luminance(other) / luminance(own + other));
+        assert!((found - expected).abs() < 1e-3 && sheet.materials[0].surface.two_sided);
         for (warnings, read) in again(&folder, &scene) {
             assert_eq!(warnings, [""; 0]);
             let MaterialKind::DiffuseTransmission { reflectance: own, transmittance: other } =

@@ -274,7 +274,9 @@ fn models_become_materials() {
         r#"<bsdf type="principledthin"><rgb name="base_color" {rgb}
            <float name="diff_trans" value="1.5"/><float name="eta" value="1.3"/></bsdf>"#
     );
-    assert_eq!(sides(&thin), (0.25 * color, 0.75 * color, 1));
+    assert_eq!(sides(&thin), (0.25 * color, 0.75 * color, 0));
+    let clear = thin.replace("eta", "spec_trans");
+    assert_eq!(sides(&clear), (0.25 * color, 0.75 * color, 1));
     let (copper, warnings) = material(
         r#"<bsdf type="twosided"><bsdf type="roughconductor"><string name="material" value="Cu"/>
         <float name="alphaU" value="0.1"/><float name="alphaV" value="0.3"/></bsdf></bsdf>"#,

@@ -120,9 +120,9 @@ impl Reader {
             "thindielectric" => self.dielectric(&parameters, None)?,
             "principled" => self.principled(&parameters)?,
             "principledthin" => {
-                self.ignored.add(features::MI_PRINCIPLED_THIN, || node.place());
+                self.without_counterpart(&parameters, &["spec_trans", "sheen", "flatness"])?;
                 parameters.without_effect(
-                    "roughness anisotropic spec_trans eta spec_tint sheen sheen_tint flatness \
+                    "roughness anisotropic eta spec_tint sheen_tint \
                      diffuse_reflectance_sampling_rate",
                 );
                 let base = self.value_or(&parameters, "base_color", Role::Reflectance, 0.5)?;

@@ -17,21 +17,29 @@ const WITHOUT_COUNTERPART: [&str; 5] =
     ["anisotropic", "spec_tint", "sheen", "flatness", "clearcoat"];
 
 impl Reader {
+    /// Names parameters that are left out, where they are not 0.
+    pub(super) fn without_counterpart(
+        &mut self,
+        parameters: &Parameters<'_>,
+        names: &[&str],
+    ) -> Result<()> {
+        for name in names {
+            let value = self.value_or(parameters, name, Role::Index, 0.0)?;
+            if !matches!(value, Value::Color(Vec3::ZERO)) {
+                let place = || parameters.node.place();
+                self.ignored.add_named(features::MI_PRINCIPLED_REST, &format!("`{name}`"), place);
+            }
+        }
+        Ok(())
+    }
+
     pub(super) fn principled(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let node = parameters.node;
         let mut number =
             |name: &str, default: f32| self.value_or(parameters, name, Role::Index, default);
         let (roughness, metallic) = (number("roughness", 0.5)?, number("metallic", 0.0)?);
         let spec_trans = number("spec_trans", 0.0)?;
-        for name in WITHOUT_COUNTERPART {
-            if !matches!(
-                self.value_or(parameters, name, Role::Index, 0.0)?,
-                Value::Color(Vec3::ZERO)
-            ) {
-                let place = || node.place();
-                self.ignored.add_named(features::MI_PRINCIPLED_REST, &format!("`{name}`"), place);
-            }
-        }
+        self.without_counterpart(parameters, &WITHOUT_COUNTERPART)?;
         parameters.without_effect(
             "sheen_tint clearcoat_gloss diffuse_reflectance_sampling_rate \
              main_specular_sampling_rate clearcoat_sampling_rate",

@@ -51,12 +51,14 @@ pub(super) struct Translator<'a> {
 impl Translator<'_> {
     pub(super) fn model(mut self) -> Model {
         let surface = self.subject.surface;
-        let is_glass = self.subject.material.kind.is_glass();
+        let kind = &self.subject.material.kind;
+        let is_glass = kind.is_glass();
+        let has_sides = is_glass || matches!(kind, MaterialKind::DiffuseTransmission { .. });
         let mut bsdf = self.reflection();
-        if surface.two_sided && !is_glass {
+        if surface.two_sided && !has_sides {
             bsdf = around("twosided", "", &bsdf);
-        } else if !surface.two_sided && is_glass {
-            self.subject.warn("its back is black in Fenestra, and glass in Mitsuba");
+        } else if !surface.two_sided && has_sides {
+            self.subject.warn("its back is black in Fenestra alone");
         }
         if let Some(normal) = &surface.normal {
             bsdf = self.bumps(normal, &bsdf);
@@ -91,9 +93,15 @@ impl Translator<'_> {
             MaterialKind::Diffuse { reflectance } => {
                 element("diffuse", &self.color("reflectance", *reflectance))
             }
-            MaterialKind::DiffuseTransmission { reflectance, .. } => {
-                self.subject.warn("Mitsuba has no sheet that scatters light through: it is lost");
-                element("diffuse", &self.color("reflectance", *reflectance))
+            MaterialKind::DiffuseTransmission { reflectance, transmittance } => {
+                self.subject.warn(
+                    "Mitsuba's principledthin has one ratio of both sides for all colours, and \
+                     reflects by Disney's diffuse part",
+                );
+                let all = *reflectance + *transmittance;
+                let passed = luminance(*transmittance) / luminance(all).max(f32::MIN_POSITIVE);
+                let content = self.color("base_color", all) + &float("diff_trans", 2.0 * passed);
+                element("principledthin", &content)
             }
             MaterialKind::Plastic { diffuse, alpha, ior } => {
                 self.warn_of_masking(*alpha, "plastic");
