@@ -171,6 +171,25 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
     assert_eq!(reflectance, 0.5 * 0.75 * Vec3::new(0.9, 1.0, 1.0));
     assert_eq!(transmittance, 0.5 * 0.25 * Vec3::new(0.4, 0.8, 1.0));
     assert!(warnings.len() == 1 && warnings[0].contains("ignored gloss, metal"), "{warnings:?}");
+    // The share that goes through may come from an image, here its opacity of ¼ and ¾.
+    let inline = base64(&png([[255, 255, 255, 64], [255, 255, 255, 191]]));
+    let images = format!(
+        r#", "images": [{{"uri": "data:image/png;base64,{inline}"}}], "textures": [{{"source": 0}}]"#
+    );
+    let material = format!(
+        r#"{{"pbrMetallicRoughness": {{{smooth}}}, "extensions":
+        {{"KHR_materials_diffuse_transmission": {{"diffuseTransmissionFactor": 0.8,
+        "diffuseTransmissionTexture": {{"index": 0}}}}}}}}"#
+    );
+    let (found, warnings) = gltf_material(&folder, &material, &images);
+    let MaterialKind::DiffuseTransmission { reflectance, transmittance } = found.kind else {
+        panic!("{found:?}")
+    };
+    let mean = Vec3::from(found.surface.color.unwrap().mean());
+    let base = Vec3::new(0.9, 1.0, 1.0);
+    assert!((reflectance * mean).abs_diff_eq(0.6 * base, 5e-3), "{}", reflectance * mean);
+    assert!((transmittance * mean).abs_diff_eq(Vec3::splat(0.4), 5e-3), "{transmittance}");
+    assert!(warnings[0].contains("own pattern"), "{warnings:?}");
     // A metal has no such light, and glass stays glass.
     assert!(matches!(with(sheet, "").0.kind, MaterialKind::Principled(_)));
     let both = with(&format!("{sheet}, {glass}"), smooth).0;

@@ -288,6 +288,11 @@ fn materials_are_the_nearest() {
     };
     close(reflectance, [0.125; 3]);
     close(transmittance, [0.05, 0.1, 0.4]);
+    let bright = r#""diffusetransmission" "rgb reflectance" [0.1 0.2 0.9] "float scale" 2"#;
+    let MaterialKind::DiffuseTransmission { reflectance, .. } = material(bright).kind else {
+        panic!()
+    };
+    close(reflectance, [0.2, 0.4, 1.0]);
     let MaterialKind::Plastic { diffuse, alpha, ior } = material(
         r#""coateddiffuse" "rgb reflectance" [0.1 0.2 0.3] "float roughness" 0.25 "float eta" 1.3"#,
     )

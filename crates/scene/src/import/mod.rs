@@ -130,6 +130,8 @@ pub(crate) fn sheet(sides: [Value; 2]) -> (MaterialKind, Option<TextureUse>, boo
     let (all, any_mean) =
         Value::combined(sides.clone(), |[reflected, transmitted]| reflected + transmitted);
     let Value::Image(all) = all else {
+        let [reflectance, transmittance] =
+            [reflectance, transmittance].map(|side| side.clamp(Vec3::ZERO, Vec3::ONE));
         return (MaterialKind::DiffuseTransmission { reflectance, transmittance }, None, false);
     };
     let (unlike, _) = Value::combined(sides, |[reflected, transmitted]| {
