@@ -73,7 +73,11 @@ impl<'a> Materials<'a> {
     fn of_entity(&mut self, entity: &Entity, kind: &str, name: String) -> Result<Option<Material>> {
         let mut surface = Surface::default();
         let kind = match kind {
-            "diffuse" => self.diffuse(entity, "reflectance", 0.5, 1.0, &mut surface)?,
+            "diffuse" => {
+                let value = self.textures.spectrum(entity, "reflectance")?;
+                let reflectance = color(value.unwrap_or(Value::number(0.5)), &mut surface);
+                MaterialKind::Diffuse { reflectance: reflectance.clamp(Vec3::ZERO, Vec3::ONE) }
+            }
             "coateddiffuse" => {
                 self.layers(entity)?;
                 self.plastic(entity, &mut surface)?
@@ -168,20 +172,6 @@ impl<'a> Materials<'a> {
             self.textures.log.ignore(features::PBRT_COAT_ALBEDO, &entity.place);
         }
         Ok(())
-    }
-
-    fn diffuse(
-        &mut self,
-        entity: &Entity,
-        parameter: &str,
-        otherwise: f64,
-        scale: f32,
-        surface: &mut Surface,
-    ) -> Result<MaterialKind> {
-        let value = self.textures.spectrum(entity, parameter)?;
-        let value = value.unwrap_or(Value::number(otherwise)).scaled(scale);
-        let reflectance = color(value, surface);
-        Ok(MaterialKind::Diffuse { reflectance: reflectance.clamp(Vec3::ZERO, Vec3::ONE) })
     }
 
     fn plastic(&mut self, entity: &Entity, surface: &mut Surface) -> Result<MaterialKind> {
