@@ -277,30 +277,3 @@ fn shorten(text: &str) -> String {
     }
     short
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_kind_is_one_warning_and_kinds_are_bounded() {
-        let mut ignored = Ignored::default();
-        for line in 1..=3 {
-            ignored.add(OBJ_COLOR, || format!("line {line}"));
-        }
-        ignored.add_named(OBJ_STATEMENT, "`deg`", || "line\n4".to_owned());
-        let path = Path::new("a.obj");
-        assert_eq!(ignored.warnings(path)[0], "a.obj: ignored vertex colours (3, first in line 1)");
-        let second = "a.obj: ignored `deg` (line?4)";
-        assert_eq!(ignored.warnings(path)[1], second);
-        for number in 0..1000 {
-            ignored.add_named(OBJ_STATEMENT, &format!("`x{number}`"), || "line 5".to_owned());
-        }
-        let warnings = ignored.warnings(path);
-        assert_eq!(warnings.len(), MAX_KINDS + 1);
-        assert!(warnings[MAX_KINDS].contains("other statements, by name (938, first in line 5)"));
-        let mut twice = ignored.clone();
-        twice.merge(&ignored);
-        assert!(twice.warnings(path)[0].contains("(6, first in line 1)"));
-    }
-}

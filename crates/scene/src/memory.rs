@@ -190,39 +190,3 @@ pub fn parse_size(text: &str) -> Result<u64, String> {
         .map(|bytes| bytes as u64)
         .ok_or_else(|| format!("expected a size such as 512M or 8G, found {text:?}"))
 }
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used, reason = "tests may panic")]
-
-    use super::*;
-
-    #[test]
-    fn sizes_have_units() {
-        assert_eq!(parse_size("1000000"), Ok(1_000_000));
-        assert_eq!(parse_size("512M"), Ok(512 << 20));
-        assert_eq!(parse_size("2.5GiB"), Ok(5 << 29));
-        assert_eq!(parse_size("3kb"), Ok(3 << 10));
-        for wrong in ["", "M", "-1G", "0", "nan", "1e400", "12 parsecs"] {
-            assert!(parse_size(wrong).is_err(), "{wrong}");
-        }
-        assert_eq!(size(512), "512 B");
-        assert_eq!(size(5 << 29), "2.5 GiB");
-    }
-
-    #[test]
-    fn a_request_beyond_the_limit_says_who_asks_for_how_much() {
-        assert_eq!(check("a map", 5), Ok(()));
-        let refused = check("a map", u64::MAX).unwrap_err().to_string();
-        assert!(refused.contains("a map asks for 16.0 EiB"), "{refused}");
-        assert!(check_count("a map", usize::MAX, 12).is_err());
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn the_limit_and_the_memory_in_use_are_known() {
-        let bound = tightest_bound();
-        assert!((1 << 20..1 << 50).contains(&bound.in_use), "{bound:?}");
-        assert!((1 << 26..1 << 50).contains(&limit()), "{}", limit());
-    }
-}

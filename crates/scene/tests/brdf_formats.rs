@@ -9,7 +9,7 @@ use std::{
 
 use fenestra_scene::measured::{
     CELL_COUNT, MeasuredTable, bin_directions, cell_index,
-    lookup::half_difference_angles,
+    lookup::{half_difference_angles, measured_pdf, measured_sample},
     merl::{FILE_BYTES, HEADER_BYTES, SCALES},
 };
 use glam::Vec3;
@@ -294,4 +294,86 @@ fn interpolation_is_continuous() {
             assert!(largest - smallest < 0.01, "{outgoing}, {incident}: {values:?}");
         }
     }
+}
+
+/// A lobe of a few bins, seen along the normal: lines between its nodes would reflect 1.7% too much.
+#[test]
+fn a_narrow_lobe_reflects_what_its_function_does() {
+    let lobe = |half_angle: f32| Vec3::splat((-(half_angle / 0.01).powi(2)).exp());
+    let table = MeasuredTable::tabulate(|outgoing, incident| {
+        let half_vector = outgoing + incident;
+        lobe(half_vector.truncate().length().atan2(half_vector.z))
+    });
+    let table = table.unwrap();
+    let mut sums = [0.0_f64; 2];
+    for step in 0..20_000 {
+        let angle = (step as f32 + 0.5) * 5e-6;
+        let incident = Vec3::new(angle.sin(), 0.0, angle.cos());
+        for (sum, value) in
+            sums.iter_mut().zip([table.evaluate(Vec3::Z, incident), lobe(angle / 2.0)])
+        {
+            *sum += f64::from(value.x * angle.sin() * angle.cos());
+        }
+    }
+    let ratio = sums[0] / sums[1];
+    assert!((ratio - 1.0).abs() < 3e-3, "{ratio}");
+}
+
+/// Samples divided by their density integrate what has a closed form over the hemisphere.
+#[test]
+fn samples_are_as_dense_as_stated() {
+    let table = MeasuredTable::tabulate(|outgoing, incident| {
+        let half_vector = (outgoing + incident).normalize();
+        Vec3::splat(0.1 + 0.2 * (-(half_vector.z.acos() / 0.4).powi(2)).exp())
+    });
+    let table = table.unwrap();
+    let words = table.words();
+    let outgoing = Vec3::new(0.6, 0.0, 0.8);
+    let count = 100_000;
+    let mut sums = [0.0_f64; 4];
+    for sample in 1..=count {
+        // The additive sequence of the plastic number for three dimensions.
+        let digit =
+            |power: i32| (f64::from(sample) * 1.220_744_084_605_759_5_f64.powi(-power)).fract();
+        let u = Vec3::new(digit(1) as f32, digit(2) as f32, digit(3) as f32);
+        let way = measured_sample(words, 0, outgoing, u);
+        if way.z <= 0.0 {
+            continue;
+        }
+        let theta_half = half_difference_angles(outgoing, way).x;
+        let pdf = measured_pdf(words, 0, outgoing, way, theta_half);
+        let moments = [1.0, way.x * way.x, way.y * way.y, way.x];
+        for (sum, moment) in sums.iter_mut().zip(moments) {
+            *sum += f64::from(way.z * moment / pdf);
+        }
+    }
+    let pi = std::f64::consts::PI;
+    let expected = [pi, 0.25 * pi, 0.25 * pi, 0.0];
+    for (sum, expected) in sums.iter().zip(expected) {
+        let found = sum / f64::from(count);
+        assert!((found - expected).abs() < 0.01, "{found} instead of {expected}");
+    }
+}
+
+/// Reflectance toward the normal of a Cornell file with a spectrum sampled so often, nm.
+fn cornell_color(step: usize, spectrum: impl Fn(f64) -> f64) -> Vec3 {
+    let wavelengths: Vec<f64> = (380..=780).step_by(step).map(|nm| nm as f64).collect();
+    let list = |value: &dyn Fn(f64) -> f64| {
+        wavelengths.iter().map(|&nm| format!("{} ", value(nm))).collect::<String>()
+    };
+    let text = format!("{} {}\n0 0 0 0 {}", wavelengths.len(), list(&|nm| nm), list(&spectrum));
+    let folder = Folder::new();
+    let table = MeasuredTable::load(&folder.write("a.brdf", text)).unwrap();
+    table.evaluate(Vec3::Z, Vec3::Z)
+}
+
+/// The white of sRGB is D65: a grey reflectance stays grey, to the digits of the matrix. A spectrum that is
+/// sampled twice as finely has the same colour.
+#[test]
+fn spectra_of_samples_are_seen_under_daylight() {
+    let grey = cornell_color(10, |_| 0.1);
+    assert!((10.0 * grey - Vec3::ONE).abs().max_element() < 3e-3, "{grey}");
+    let spectrum = |nm: f64| 0.1 + 0.05 * ((nm - 400.0) / 60.0).sin();
+    let [coarse, fine] = [10, 5].map(|step| cornell_color(step, spectrum));
+    assert!(coarse.abs_diff_eq(fine, 5e-4), "{coarse} {fine}");
 }

@@ -109,18 +109,3 @@ fn number_of<T>(list: &mut Vec<T>, value: T, is_same: impl Fn(&T, &T) -> bool) -
 fn triple(vector: Vec3) -> String {
     format!("{}, {}, {}", vector.x, vector.y, vector.z)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_kind_of_difference_is_one_line() {
-        let warnings =
-            ["`a`: darker at alpha = 0.3", "`b`: darker at alpha = 0.25", "`b`: brighter"];
-        let warnings = warnings.map(|text| format!("material {text}")).to_vec();
-        let export = Export::new(warnings.clone(), || Ok(()));
-        let first = format!("{} (1 others likewise)", warnings[0]);
-        assert_eq!(export.summary(), [first, warnings[2].clone()]);
-    }
-}
