@@ -55,6 +55,36 @@ fn the_camera_follows_its_key_frames() {
     }
 }
 
+#[test]
+fn the_camera_passes_its_keys_and_does_not_overshoot() {
+    const TIMES: [f32; 4] = [0.0, 1.0, 1.5, 3.0];
+    let curve = |values: [f32; 4], time: f32| {
+        let key = |(time, x): (f32, f32)| format!("{{ time = {time}, position = [{x}, 1, 5] }},\n");
+        let keys: String = TIMES.into_iter().zip(values).map(key).collect();
+        let head = "camera = { position = [0, 1, 5], look_at = [0, 1, 0], vertical_fov_deg = 40";
+        let text =
+            format!("{head}, keyframe = [\n{keys}] }}\nenvironment = {{ constant = [1, 1, 1] }}");
+        at("room.toml", &text, Some(time)).unwrap().camera.position.x
+    };
+    let values = [1.0, 4.0, 4.0, -2.0];
+    for (time, value) in TIMES.into_iter().zip(values) {
+        assert_eq!(curve(values, time), value);
+    }
+    assert_eq!([curve(values, -1.0), curve(values, 1.2), curve(values, 9.0)], [1.0, 4.0, -2.0]);
+    for step in 0..100 {
+        let found = curve(values, 0.03 * step as f32);
+        assert!((-2.0..=4.0).contains(&found), "{found}");
+    }
+    // A straight line stays one, and the slope is the same on both sides of a key.
+    assert!((curve([0.0, 2.0, 3.0, 6.0], 2.2) - 4.4).abs() < 1e-5);
+    let rising = [0.0, 1.0, 5.0, 6.0];
+    let slope = |from: f32| (curve(rising, from + 1e-3) - curve(rising, from)) / 1e-3;
+    assert!((slope(1.0) - slope(1.0 - 1e-3)).abs() < 0.05, "{} {}", slope(1.0), slope(0.999));
+    // By the lengths of both stretches: 1 s at 1 per second, then 0.5 s at 8.
+    let expected = 3.0 * 1.5 / ((2.0 * 0.5 + 1.0) / 1.0 + (0.5 + 2.0 * 1.0) / 8.0);
+    assert!((slope(1.0) - expected).abs() < 0.05, "{} {expected}", slope(1.0));
+}
+
 /// A triangle, keys at 1, 2 and 4 s, and values for shifts, turns about Y and shifts with slopes.
 fn document(channels: &str, samplers: &str) -> String {
     let half = 0.5_f32.sqrt();

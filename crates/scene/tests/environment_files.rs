@@ -7,7 +7,9 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
 };
 use fenestra_scene::{
-    environment::{CourtParameters, EnvironmentMap, EnvironmentTables, SkyParameters},
+    environment::{
+        CourtParameters, DaylightParameters, EnvironmentMap, EnvironmentTables, SkyParameters,
+    },
     math::{colour::luminance, frame::direction_from_lat_long},
     picture::RgbImage,
 };
@@ -314,6 +316,84 @@ fn the_sun_stands_where_it_should_with_the_power_it_should() {
             assert!((near / expected - 1.0).abs() < 1e-4, "{width}, {radius_deg}°: {near}");
             assert!((near / flux(&map, |_| true) - 1.0).abs() < 1e-9);
         }
+    }
+}
+
+fn daylight(parameters: DaylightParameters) -> EnvironmentMap {
+    EnvironmentMap::daylight(&parameters, 1.0).unwrap()
+}
+
+/// Irradiance of the sun of a daylight on a surface that faces it, and its direction.
+fn sun(parameters: DaylightParameters) -> (Vec3, Vec3) {
+    let [all, sky] =
+        [1.0, 0.0].map(|sun_scale| daylight(DaylightParameters { sun_scale, ..parameters }));
+    let (width, height) = (all.width as usize, all.height as usize);
+    let (mut irradiance, mut direction) = (Vec3::ZERO, Vec3::ZERO);
+    for (index, (all, sky)) in all.texels.iter().zip(&sky.texels).enumerate() {
+        let (row, column) = ((index / width) as f32, (index % width) as f32);
+        let edge = |row: f32| (std::f32::consts::PI * row / height as f32).cos();
+        let solid_angle = std::f32::consts::TAU / width as f32 * (edge(row) - edge(row + 1.0));
+        let own = (*all - *sky) * solid_angle;
+        let uv = Vec2::new((column + 0.5) / width as f32, (row + 0.5) / height as f32);
+        irradiance += own;
+        direction += luminance(own) * direction_from_lat_long(uv);
+    }
+    (irradiance, direction.normalize())
+}
+
+/// Values of the emitter `sunsky` of Mitsuba 3.9.1 in RGB.
+#[test]
+fn sky_and_sun_are_those_of_mitsuba() {
+    let of = |sun_direction: Vec3, turbidity: f32, albedo: [f32; 3]| DaylightParameters {
+        sun_direction: Some(sun_direction.to_array()),
+        turbidity,
+        albedo,
+        ..DaylightParameters::default()
+    };
+    let sky = |sun: Vec3, turbidity: f32, albedo: [f32; 3]| {
+        daylight(DaylightParameters { sun_scale: 0.0, ..of(sun, turbidity, albedo) })
+    };
+    let map = sky(Vec3::new(0.3, 0.6, 0.5), 3.7, [0.2; 3]);
+    for (direction, expected) in [
+        (Vec3::Y, [0.02852724, 0.04459, 0.08474188]),
+        (Vec3::new(0.5, 0.2, -0.5), [0.06040344, 0.09969734, 0.16682282]),
+        (Vec3::new(-0.3, 0.4, 0.2), [0.03280686, 0.05470972, 0.10282528]),
+    ] {
+        let found = map.radiance(direction.normalize());
+        let error = (found / Vec3::from(expected) - 1.0).abs().max_element();
+        assert!(error < 2e-3, "{direction}: {found} {expected:?}");
+    }
+    for (elevation, turbidity, expected) in [
+        (25.3_f32, 3.0, [1.3508092, 1.036_220_9, 0.65123785]),
+        (7.7, 4.4, [0.663_972_8, 0.356_092_34, 0.098_340_44]),
+        (1.0, 3.0, [0.26227944, 0.07084908, 0.0]),
+    ] {
+        let (sine, cosine) = elevation.to_radians().sin_cos();
+        let (found, _) = sun(of(Vec3::new(cosine, sine, 0.0), turbidity, [0.2; 3]));
+        assert!(found.abs_diff_eq(Vec3::from(expected), 1e-3), "{elevation}: {found}");
+    }
+    assert!(daylight(of(Vec3::NEG_Y, 3.0, [0.2; 3])).is_black());
+    // The sky shows the colour of the ground.
+    let zenith = |albedo: [f32; 3]| sky(Vec3::Y, 3.0, albedo).radiance(Vec3::X).to_array();
+    let (grey, white) = (zenith([0.2; 3]), zenith([1.0; 3]));
+    assert_eq!(zenith([0.2, 1.0, 0.2]), [grey[0], white[1], grey[2]]);
+    assert!(white[1] > grey[1]);
+}
+
+/// The equation of time: clocks are 16.4 minutes behind on 3 November and 14.2 ahead on 11 February.
+#[test]
+fn the_sun_stands_south_at_noon_of_sundials() {
+    for (date, minutes) in [([2025, 11, 3], -16.4), ([2025, 2, 11], 14.2)] {
+        let hour = 12.0 + minutes / 60.0;
+        let noon = DaylightParameters {
+            date,
+            hour,
+            timezone: 0.0,
+            place: [50.0, 0.0],
+            ..Default::default()
+        };
+        let (_, direction) = sun(noon);
+        assert!(direction.z > 0.0 && direction.x.abs() < 1e-3, "{date:?}: {direction}");
     }
 }
 

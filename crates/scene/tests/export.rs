@@ -294,3 +294,29 @@ fn images_continue_as_far_as_formats_let_them() {
         read.materials.iter().filter_map(|own| own.surface.color.as_ref()).collect();
     assert!(!images.is_empty() && images.iter().all(|used| used.wrap == [Wrap::Clamp; 2]));
 }
+
+#[test]
+fn gltf_keeps_matrices_of_scale_turn_and_shift() {
+    let folder = Folder::new();
+    let mut scene = square(&folder, "type = \"diffuse\"\nreflectance = { texture = \"a.png\" }");
+    let path = folder.path().join("a.gltf");
+    let mut read = |matrix: [[f32; 3]; 2]| {
+        scene.materials[0].surface.color.as_mut().unwrap().image_from_uv = matrix;
+        let export = gltf::export(&scene, &path);
+        export.write().unwrap();
+        let color = Scene::load(&path).unwrap().materials[0].surface.color.take().unwrap();
+        (color.image_from_uv, export.warnings.iter().any(|text| text.contains("is sheared")))
+    };
+    for ([x, y], angle) in [([2.0, 3.0], 0.5_f32), ([1.0, -1.0], 0.0), ([-2.0, 0.5], 3.0)] {
+        let (sine, cosine) = angle.sin_cos();
+        let matrix = [[cosine * x, sine * y, 0.25], [-sine * x, cosine * y, 0.75]];
+        let (found, is_sheared) = read(matrix);
+        let mut pairs = matrix.iter().flatten().zip(found.iter().flatten());
+        assert!(!is_sheared && pairs.all(|(a, b)| (a - b).abs() < 1e-5), "{found:?}");
+    }
+    assert!(read([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0]]).1);
+    let same = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    assert_eq!(read(same), (same, false));
+    let text = std::fs::read_to_string(folder.path().join("a.gltf")).unwrap();
+    assert!(!text.contains("KHR_texture_transform"), "{text}");
+}

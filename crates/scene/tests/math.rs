@@ -1,8 +1,9 @@
-//! Placements of objects, and the square map of the sphere.
+//! Placements of objects, the square map of the sphere, and colours below coats.
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
 use fenestra_scene::{
     Geometry,
+    coat::{albedo_below_coat, base_below_coat},
     geometry::Dropped,
     math::equal_area::{direction_from_square, square_from_direction},
     mesh::Mesh,
@@ -127,4 +128,18 @@ fn the_map_is_its_own_inverse() {
         let back = direction_from_square(square_from_direction(axis));
         assert!(back.distance(axis) < 2e-6, "{axis}, then {back}");
     }
+}
+
+#[test]
+fn colours_deepen_below_a_coat_and_white_stays() {
+    let below = albedo_below_coat(1.5);
+    assert_eq!((below(0.0), below(1.0)), (0.0, 1.0));
+    // The inside of glass throws back three fifths [Egan & Hilgeman 1973]; light bounces in a series:
+    // ρ T Σ (ρ Fi)ⁿ, with T = 1 − Fi.
+    assert!((below(1e-4) / 1e-4 - 0.4037).abs() < 1e-3, "{}", below(1e-4));
+    let series: f32 = (0..200).map(|n| 0.5 * 0.4037 * (0.5 * 0.5963_f32).powi(n)).sum();
+    assert!((below(0.5) - series).abs() < 1e-3, "{} and {series}", below(0.5));
+    let base = base_below_coat(1.5);
+    assert!([0.0, 0.3, 1.0].iter().all(|&albedo| (base(below(albedo)) - albedo).abs() < 1e-6));
+    assert!((albedo_below_coat(1.0)(0.5) - 0.5).abs() < 1e-3, "no coat");
 }

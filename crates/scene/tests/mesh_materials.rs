@@ -680,6 +680,51 @@ fn mtl_materials_become_surfaces() {
 }
 
 #[test]
+fn options_of_images_stand_before_names_with_spaces() {
+    let folder = Folder::new();
+    for name in ["my oak.png", "oak.png", "-oak.png", "2.png"] {
+        folder.write(name, png([[128, 128, 255, 255]; 2]));
+    }
+    let options = "-s 2 3 1 -o 0.5 -clamp on -bm 0.3 -blendu off -mm 0.1 0.8 -imfchan g";
+    let (found, warnings) = mtl_material(&folder, &format!("norm {options} my oak.png"));
+    assert!(warnings.len() == 1 && warnings[0].contains("option `-blendu`"), "{warnings:?}");
+    let normal = found.surface.normal.unwrap();
+    assert_eq!(normal.image_from_uv, [[2.0, 0.0, 0.5], [0.0, -3.0, 1.0]]);
+    assert_eq!((normal.wrap, normal.channels), ([Wrap::Clamp; 2], Channels::Green));
+    assert_eq!((normal.scale, normal.bias), ([0.8; 3], [0.1; 3]));
+    assert_eq!(found.surface.normal_scale, 0.3);
+    for name in ["oak.png", "-oak.png", "2.png", "-s 2 2.png"] {
+        let color = mtl_material(&folder, &format!("map_Kd {name}")).0.surface.color.unwrap();
+        let expected = folder.path().join(name.strip_prefix("-s 2 ").unwrap_or(name));
+        assert_eq!(color.texture.name, expected.display().to_string());
+    }
+    assert!(mtl_material(&folder, "map_Kd").1[0].contains("image ``"));
+}
+
+/// The tip of the arrow of the Khronos model `TextureTransformTest` is at 7/9 of the image; its marks for the
+/// right place of the tip are the children of the nodes "Rotation" and "All", relative to the upper left
+/// corner.
+#[test]
+fn transforms_of_textures_turn_as_the_khronos_model_shows() {
+    let folder = Folder::new();
+    folder.write("a.png", png([[255; 4]; 2]));
+    let tip = |transform: &str, [u, v]: [f32; 2]| {
+        let material = format!(
+            r#"{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0,
+            "extensions": {{"KHR_texture_transform": {{{transform}}}}}}}}}}}"#
+        );
+        let rest = r#", "images": [{"uri": "a.png"}], "textures": [{"source": 0}]"#;
+        let color = gltf_material(&folder, &material, rest).0.surface.color.unwrap();
+        color.image_from_uv.map(|row| row[0] * u + row[1] * v + row[2])
+    };
+    let turned = tip(r#""rotation": 0.3926991"#, [0.421, 1.016]);
+    let all = r#""rotation": 0.3, "scale": [1.5, 1.5], "offset": [-0.2, -0.1]"#;
+    for place in [turned, tip(all, [0.43, 0.75])] {
+        assert!(place.iter().all(|coordinate| (coordinate - 0.77).abs() < 0.03), "{place:?}");
+    }
+}
+
+#[test]
 fn names_do_not_leave_the_folder_of_the_scene() {
     let folder = Folder::new();
     folder.write("secret.txt", "newmtl a\nKd top secret\n");
@@ -700,7 +745,15 @@ fn names_do_not_leave_the_folder_of_the_scene() {
         assert!(mesh.materials[0].material.surface.color.is_none());
     };
     let absolute = folder.path().join("secret.txt");
-    for name in ["../secret.txt", absolute.to_str().unwrap(), "x/../../secret.txt"] {
+    leave_out(format!("mtllib \\\\host\\a.mtl\n{obj}"), "cannot read the material library");
+    for name in [
+        "../secret.txt",
+        absolute.to_str().unwrap(),
+        "x/../../secret.txt",
+        "C:/secret.txt",
+        "file:///secret.txt",
+        "maps/..",
+    ] {
         leave_out(format!("mtllib {name}\n{obj}"), "cannot read the material library");
         folder.write("scene/a.mtl", format!("newmtl a\nmap_Kd {name}\n"));
         leave_out(format!("mtllib a.mtl\n{obj}"), "ignored image `");

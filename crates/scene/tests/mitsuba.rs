@@ -798,6 +798,77 @@ fn round_shapes_stand_where_they_should() {
     }
 }
 
+/// Areas, and texture coordinates that rays of Mitsuba 3.9.1 met near these vertices.
+#[test]
+fn shapes_face_outward_and_have_the_coordinates_of_mitsuba() {
+    type Coordinates = ([f32; 3], [f32; 2]);
+    let cases: [(&str, f32, &[Coordinates]); 5] = [
+        (
+            "sphere",
+            4.0 * PI,
+            &[
+                ([0.842615, 0.2, 0.5], [0.0370901, 0.333333]),
+                ([-0.3, 0.812404, -0.5], [0.3063, 0.666667]),
+            ],
+        ),
+        ("disk", PI, &[([0.6, 0.8, 0.0], [1.0, 0.147584]), ([0.6, -0.8, 0.0], [1.0, 0.852416])]),
+        ("cylinder", 2.0 * PI, &[([0.916515, 0.4, 1.0], [0.0654949, 1.0])]),
+        ("rectangle", 4.0, &[([1.0, -1.0, 0.0], [1.0, 0.0])]),
+        ("cube", 24.0, &[]),
+    ];
+    for (shape, area, coordinates) in cases {
+        let mesh = load(&format!("<shape type=\"{shape}\"/>")).geometry;
+        let vector = |of: &[[f32; 3]], at: u32| Vec3::from(of[at as usize]);
+        let mut sum = 0.0;
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|at| vector(&mesh.positions, at));
+            let normal = (b - a).cross(c - a);
+            sum += 0.5 * normal.length();
+            for own in triangle.map(|at| vector(&mesh.normals, at)) {
+                assert!((own.length() - 1.0).abs() < 1e-6, "{shape}");
+                assert!(own.dot(normal.normalize()) > 0.99, "{shape}: {own} on {normal}");
+            }
+        }
+        assert!((sum / area - 1.0).abs() < 1e-3, "{shape}: {sum}, expected {area}");
+        for (place, expected) in coordinates {
+            let distance =
+                |at: &u32| vector(&mesh.positions, *at).distance_squared((*place).into());
+            let corners = mesh.triangles.iter().flatten();
+            let nearest = corners.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+            let found = Vec2::from(mesh.uvs[0][*nearest as usize]);
+            assert!(found.abs_diff_eq((*expected).into(), 1.0 / 128.0), "{shape}: {found}");
+        }
+        assert!(shape != "cube" || mesh.uvs[0][0] == [0.0, 1.0]);
+    }
+}
+
+/// Albedo of Mitsuba 3.9.1's `roughplastic` less that of its coat, over the share of light that the coat
+/// leaves: alpha, index, white base, grey base of ½ that deepens.
+#[test]
+fn rough_coats_lose_what_those_of_mitsuba_lose() {
+    for (alpha, ior, white, grey) in [
+        (0.05, 1.5, 0.9501, 0.2829),
+        (0.3, 1.5, 0.6586, 0.2431),
+        (1.0, 1.5, 0.2722, 0.1276),
+        (0.1, 1.3, 0.9236, 0.3461),
+        (0.5, 1.8, 0.3898, 0.1447),
+    ] {
+        for (base, deepens, expected) in [(1.0, false, white), (0.5, true, grey)] {
+            let floats = [("alpha", alpha), ("int_ior", ior), ("ext_ior", 1.0)]
+                .map(|(name, value)| format!("<float name=\"{name}\" value=\"{value}\"/>"));
+            let (plastic, _) = material(&format!(
+                "<bsdf type=\"roughplastic\"><string name=\"distribution\" value=\"ggx\"/>{}\
+                 <rgb name=\"diffuse_reflectance\" value=\"{base}\"/>\
+                 <boolean name=\"nonlinear\" value=\"{deepens}\"/></bsdf>",
+                floats.concat()
+            ));
+            let MaterialKind::Plastic { diffuse, .. } = plastic.kind else { panic!() };
+            let ratio = diffuse.x / expected;
+            assert!((ratio - 1.0).abs() < 0.02, "{alpha} {ior}: {diffuse} {expected}");
+        }
+    }
+}
+
 #[test]
 fn instances_repeat_their_group() {
     let scene = load(
@@ -983,6 +1054,21 @@ fn files_beside_the_folder_need_leave() {
         let scene = loaded_with(&path, LoadOptions { allow_root, ..Default::default() }).unwrap();
         assert!(!scene.geometry.triangles.is_empty() && scene.warnings.is_empty());
     }
+    let allow_root = Some(folder.path().join("common"));
+    let options = LoadOptions { allow_root, ..Default::default() };
+    folder.write("commoner/ball.ply", PLY);
+    let whole = folder.path().join("common/ball.ply");
+    for (name, is_allowed) in [
+        ("../common/ball.ply", true),
+        (whole.to_str().unwrap(), true),
+        ("../commoner/ball.ply", false),
+        ("../common/../commoner/ball.ply", false),
+        ("/etc/passwd", false),
+        ("", false),
+    ] {
+        let path = folder.write("room/a.xml", document(&format!("{SENSOR}{}", shape(name))));
+        assert_eq!(loaded_with(&path, options.clone()).is_ok(), is_allowed, "{name}");
+    }
 }
 
 #[test]
@@ -1041,6 +1127,12 @@ fn daylight_stands_where_mitsuba_has_it() {
     };
     let found = brightest(&sky(&format!("{upright}{}", clock(14, 30, 1800)), "3.0.0"));
     assert!(found.dot(DEFAULT_SUN) > 0.9999, "{found}: an hour in three parts");
+    let of_sky = |scale: f32| {
+        let scales = [("sky_scale", scale), ("sun_scale", 0.0)]
+            .map(|(name, value)| format!("<float name=\"{name}\" value=\"{value}\"/>"));
+        sky(&format!("{upright}{}", scales.concat()), "3.0.0").texels.iter().sum::<Vec3>()
+    };
+    assert!((of_sky(2.0) / of_sky(0.5)).abs_diff_eq(Vec3::splat(4.0), 1e-3));
 }
 
 /// The zenith of version 0.6 is +Y, and its north −Z, as those of scene files.

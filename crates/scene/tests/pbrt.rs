@@ -11,9 +11,10 @@ use fenestra_scene::{
     lamp::{LampKind, SpotFalloff},
     load::LoadOptions,
     material::{ConductorFresnel, Material, MaterialKind},
+    math::equal_area::direction_from_square,
     texture::{Channels, Encoding, Interpolation, Texels, Wrap},
 };
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Mat3, Vec2, Vec3};
 
 use crate::support::folder::Folder;
 
@@ -697,6 +698,167 @@ fn square_maps_lie_where_pbrt_shows_them() {
     assert!(found.contains("expected a square equal-area map") && found.contains("2×1"), "{found}");
 }
 
+/// Writes a square map by its colours at points of the square.
+fn write_map(folder: &Folder, name: &str, side: usize, color: impl Fn(Vec2) -> Vec3) {
+    let mut text = format!("PF\n{side} {side}\n-1\n").into_bytes();
+    // The lowest row comes first.
+    for (row, column) in (0..side).rev().flat_map(|row| (0..side).map(move |at| (row, at))) {
+        let at = Vec2::new(column as f32 + 0.5, row as f32 + 0.5) / side as f32;
+        text.extend(color(at).to_array().iter().flat_map(|value| value.to_le_bytes()));
+    }
+    folder.write(name, text);
+}
+
+#[test]
+fn square_maps_keep_directions_and_power() {
+    let folder = Folder::new();
+    let sky = |head: &str, world: &str| {
+        let text = format!("{head} WorldBegin {world}");
+        Scene::load(&folder.write("room.pbrt", text)).unwrap().environment
+    };
+    let light = |name: &str| format!("LightSource \"infinite\" \"string filename\" \"{name}\"");
+    let color = |direction: Vec3| Vec3::splat(2.0) + direction;
+    write_map(&folder, "a.pfm", 64, |at| color(direction_from_square(at)));
+    let turn = Mat3::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), -1.0);
+    for (head, mirror) in [(MIRRORED, 1.0), (VIEW, -1.0)] {
+        let map = sky(head, &format!("Rotate 57.29578 1 2 3 {}", light("a.pfm")));
+        for direction in [Vec3::X, -Vec3::Z, Vec3::new(0.6, -0.48, 0.64)] {
+            let own = turn * (direction * Vec3::new(1.0, 1.0, mirror));
+            let (found, expected) = (map.radiance(direction), color(own));
+            assert!(found.abs_diff_eq(expected, 0.05), "{found} {expected}");
+        }
+    }
+    // One bright texel keeps its power.
+    let is_bright = |at: Vec2| at == Vec2::new(3.5, 3.5) / 40.0;
+    let bright = Vec3::new(1000.0, 500.0, 0.0);
+    write_map(&folder, "a.pfm", 40, |at| if is_bright(at) { bright } else { Vec3::ZERO });
+    let map = sky(MIRRORED, &light("a.pfm"));
+    let mut mean = DVec3::ZERO;
+    for (index, texel) in map.texels.iter().enumerate() {
+        let row = index as u32 / map.width;
+        let edge = |row: u32| (std::f64::consts::PI * f64::from(row) / f64::from(map.height)).cos();
+        mean += texel.as_dvec3() * (0.5 * (edge(row) - edge(row + 1)) / f64::from(map.width));
+    }
+    let expected = bright.as_dvec3() / 1600.0;
+    assert!(mean.abs_diff_eq(expected, 1e-5), "{mean} {expected}");
+    // A white sky, and a half of one, light the ground by π.
+    let lit = format!("{} \"float illuminance\" 3.1415927", light("a.pfm"));
+    write_map(&folder, "a.pfm", 64, |_| Vec3::ONE);
+    let white = sky(MIRRORED, &lit).radiance(Vec3::NEG_X);
+    assert!(white.abs_diff_eq(Vec3::ONE, 0.01), "{white}");
+    write_map(&folder, "a.pfm", 64, |at| if at.x < 0.5 { Vec3::ONE } else { Vec3::ZERO });
+    let half = sky(MIRRORED, &lit).radiance(Vec3::NEG_X);
+    assert!(half.abs_diff_eq(Vec3::splat(2.0), 0.02), "{half}");
+    // A small map is as it was beside a large one.
+    write_map(&folder, "a.pfm", 2, |at| at.extend(1.0));
+    write_map(&folder, "b.pfm", 4, |_| Vec3::ZERO);
+    let small = sky(MIRRORED, &light("a.pfm"));
+    let both = sky(MIRRORED, &format!("{} {}", light("a.pfm"), light("b.pfm")));
+    let mut pairs = small.texels.iter().zip(&both.texels);
+    assert!(pairs.all(|(one, other)| one.abs_diff_eq(*other, 1e-4)));
+}
+
+#[test]
+fn media_and_illuminants_have_their_colours() {
+    // Gold is yellow, copper red, silver and aluminium almost white.
+    for (metal, expected) in [
+        ("Ag", [0.97, 0.96, 0.91]),
+        ("Al", [0.91, 0.92, 0.92]),
+        ("Au", [0.98, 0.78, 0.34]),
+        ("Cu", [0.96, 0.64, 0.54]),
+    ] {
+        let index = |part: &str| format!("\"spectrum {part}\" \"metal-{metal}-{part}\"");
+        let found = material(&format!("\"conductor\" {} {}", index("eta"), index("k")));
+        let MaterialKind::Conductor { fresnel, .. } = found.kind else { panic!() };
+        let found = fresnel.at_normal_incidence();
+        assert!(found.abs_diff_eq(expected.into(), 0.01), "{metal}: {found}");
+    }
+    let unknown = format!("Material \"conductor\" \"spectrum k\" \"metal-Cu-x\" {TRIANGLE}");
+    assert!(message(&unknown).contains("unknown spectrum `metal-Cu-x`"));
+    let glass = material("\"dielectric\" \"spectrum eta\" \"glass-BK7\"").kind;
+    assert!(matches!(glass, MaterialKind::Dielectric { ior: 1.5168, .. }), "{glass:?}");
+    let light = |color: &str| {
+        let scene = world(&format!("LightSource \"point\" {color}"));
+        let LampKind::Point { intensity, .. } = scene.lamps[0].kind else { panic!() };
+        intensity
+    };
+    let white = light("\"spectrum I\" \"stdillum-D65\"");
+    assert!(white.abs_diff_eq(Vec3::ONE, 1e-3), "{white}");
+    // The white of D65 lies beside the black body of 6504 K, towards green.
+    let cold = light("\"blackbody I\" 6504");
+    assert!(cold.abs_diff_eq(Vec3::ONE, 0.06), "{cold}");
+    // Illuminant A is a black body of 2856 K: x = 0.4476, y = 0.4074.
+    let [warm, tungsten] = ["\"blackbody I\" 2856", "\"spectrum I\" \"stdillum-A\""].map(light);
+    assert!(warm.abs_diff_eq(tungsten, 0.01), "{warm} {tungsten}");
+}
+
+/// Shape of vertices and faces that is subdivided.
+fn subdivided(positions: &[[f32; 3]], faces: &[[u32; 3]], levels: i64) -> String {
+    let list = |numbers: String| numbers.replace(['[', ']', ','], " ");
+    let [points, faces] = [format!("{positions:?}"), format!("{faces:?}")].map(list);
+    format!(
+        "Shape \"loopsubdiv\" \"integer levels\" {levels} \"point3 P\" [{points}] \
+         \"integer indices\" [{faces}]"
+    )
+}
+
+#[test]
+fn a_closed_mesh_becomes_round_and_keeps_its_outside() {
+    let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let corners: Vec<[f32; 3]> =
+        axes.into_iter().chain(axes.map(|axis| axis.map(|part: f32| -part))).collect();
+    // An octahedron, counter-clockwise from outside.
+    let faces =
+        [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
+    let round = world(&subdivided(&corners, &faces, 3)).geometry;
+    assert_eq!(round.triangles.len(), 8 * 64);
+    assert_eq!(round.positions.len(), 4 * 64 + 2);
+    for (position, normal) in round.positions.iter().zip(&round.normals) {
+        let [position, normal] = [position, normal].map(|v| Vec3::from_array(*v));
+        assert!((0.3..0.7).contains(&position.length()), "{position}");
+        assert!(position.normalize().dot(normal) > 0.9, "{position} {normal}");
+    }
+    let first = |positions: &[[f32; 3]], faces: &[[u32; 3]], levels: i64| {
+        Vec3::from(world(&subdivided(positions, faces, levels)).geometry.positions[0])
+    };
+    // The limit of a vertex of valence 4: β = 3/32, γ = 1/(4 + 4), so half of it.
+    assert_eq!(first(&corners, &faces, 0), Vec3::new(0.5, 0.0, 0.0));
+    // And of a tetrahedron's, of valence 3: β = 3/16, γ = 1/(3 + 2), so a fifth of it.
+    let corners = [[1.0; 3], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+    let faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]];
+    for levels in [0, 1] {
+        let found = first(&corners, &faces, levels);
+        assert!(found.abs_diff_eq(Vec3::splat(0.2), 1e-6), "{found}");
+    }
+    let corners = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let faces = [[0, 1, 2], [0, 2, 3]];
+    let flat = world(&subdivided(&corners, &faces, 2)).geometry;
+    assert_eq!(flat.triangles.len(), 32);
+    assert!(flat.positions.iter().all(|position| position[2] == 0.0));
+    assert!(flat.normals.iter().all(|normal| *normal == [0.0, 0.0, 1.0]));
+    // Limits of a corner between the ends of its edges: ⅗ of itself and ⅕ of each.
+    for (levels, expected) in [(0, 0.2), (1, 0.6 * 0.125 + 0.2 * 0.5)] {
+        let found = first(&corners, &faces, levels);
+        assert!(found.abs_diff_eq(Vec3::new(expected, expected, 0.0), 1e-6), "{found}");
+    }
+    let many = [[0, 1, 2]; 4096];
+    let cases = [(-1, &faces[..]), (13, &faces), (i64::MAX, &faces), (12, &many)];
+    for (levels, faces) in cases {
+        let found = message(&subdivided(&corners, faces, levels));
+        assert!(found.contains("expected `levels` that make at most"), "{found}");
+    }
+}
+
+#[test]
+fn words_strings_and_brackets_need_no_spaces() {
+    let text = "Material\"diffuse\"\"rgb reflectance\"[.1 2.5e-1 .3]# note \"[\n";
+    let found = world(&format!("{text}{TRIANGLE}")).materials[0].kind.clone();
+    let MaterialKind::Diffuse { reflectance } = found else { panic!("{found:?}") };
+    assert_eq!(reflectance, Vec3::new(0.1, 0.25, 0.3));
+    let text = r#"MakeNamedMaterial "q\"\\" "string type" "diffuse" NamedMaterial "q\"\\""#;
+    assert_eq!(world(&format!("{text} {TRIANGLE}")).materials[0].name, r#"q"\"#);
+}
+
 #[test]
 fn curves_are_tubes_of_their_widths() {
     let text = r#"Scale 2 2 2
@@ -772,6 +934,12 @@ fn bad_text_is_one_error_with_file_line_and_column() {
             "room.pbrt:3:16: parameter `radius`: the file ends",
         ),
         ("Shape \"sphere\" \"float radius", "room.pbrt:3:16: expected a closing quote"),
+        ("Shape \"sph\nere\"", "room.pbrt:3:7: expected a closing quote"),
+        ("Shape \"\\q\"", "after \\, found q"),
+        (
+            "Shape\"sphere\"\"float radius\"[1 x]",
+            "room.pbrt:3:31: parameter `radius`: expected a number, found `x`",
+        ),
         ("Shape \"sphere\" \"colour x\" 1", "unknown type `colour`"),
         ("Shape \"sphere\" \"float x\" 1 \"float x\" 2", "parameter `x` is given twice"),
         ("Shape \"trianglemesh\"", "expected vertex positions `P`"),
@@ -812,7 +980,10 @@ fn bad_text_is_one_error_with_file_line_and_column() {
         assert!(found.contains(expected), "{text}: {found}");
         assert!(found.starts_with("room.pbrt:"), "{found}");
     }
+    assert!(message(&"x".repeat((1 << 16) + 1)).contains("at most 65536 bytes"));
     let folder = Folder::new();
+    let found = Scene::load(&folder.write("room.pbrt", b"\xff")).unwrap_err().to_string();
+    assert!(found.contains("expected UTF-8"), "{found}");
     for (text, expected) in [
         ("", "the file ends before WorldBegin"),
         ("WorldBegin", "expected a Camera, found none"),

@@ -920,6 +920,46 @@ fn an_included_file_names_the_group_of_its_lights() {
     );
 }
 
+/// Rooms one on the other, together 8 × 3 × 4 m, whose walls look inwards or outwards.
+#[test]
+fn a_room_is_seen_from_inside_and_a_box_is_not() {
+    let folder = Folder::new();
+    let seen = |looks_in: bool, storeys: usize| {
+        let mut text = String::new();
+        for storey in 0..storeys {
+            let height = 3.0 / storeys as f32;
+            for corner in 0..8 {
+                let [x, y, z] = [0, 1, 2].map(|axis| (corner >> axis & 1) as f32);
+                let y = (storey as f32 + y) * height;
+                text += &format!("v {} {y} {}\n", 8.0 * x - 4.0, 4.0 * z - 2.0);
+            }
+            let faces = [
+                [0, 4, 6, 2],
+                [1, 3, 7, 5],
+                [0, 1, 5, 4],
+                [2, 6, 7, 3],
+                [0, 2, 3, 1],
+                [4, 5, 7, 6],
+            ];
+            for [a, b, c, d] in faces.map(|face| face.map(|corner| 8 * storey + corner + 1)) {
+                let [b, d] = if looks_in { [d, b] } else { [b, d] };
+                text += &format!("f {a} {b} {c} {d}\n");
+            }
+        }
+        let scene = Scene::load(&folder.write("room.obj", text)).unwrap();
+        let is_inside = scene.warnings.iter().any(|text| text.contains("stands in the room"));
+        (is_inside, scene.camera.position, scene.camera.look_at)
+    };
+    let (is_inside, from, at) = seen(true, 1);
+    assert!(is_inside && (from.y - 1.6).abs() < 0.2, "{from}");
+    let (low, high) = (Vec3::new(-4.0, 0.0, -2.0), Vec3::new(4.0, 3.0, 2.0));
+    assert!(from.cmpgt(low).all() && from.cmplt(high).all(), "{from}");
+    let along = (at - from).normalize();
+    assert!(along.x.abs() > 0.9 && (at - from).length() > 4.0, "{from} {at}");
+    assert!(!seen(false, 1).0);
+    assert!(!seen(true, 4).0, "shelves");
+}
+
 #[test]
 fn files_that_are_no_scenes_are_refused() {
     let message = Scene::load(Path::new("missing.toml")).unwrap_err().to_string();
@@ -1071,21 +1111,41 @@ fn ply_reads_all_three_encodings() {
 #[test]
 fn ply_faces_may_come_first_and_polygons_may_be_concave() {
     let folder = Folder::new();
-    let text = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\n\
-        element vertex 5\nproperty float x\nproperty float y\nproperty float z\nend_header\n\
-        5 0 1 2 3 4\n0 0 0\n2 0 0\n2 2 0\n1 0.5 0\n0 2 0\n";
-    let mesh = read(&folder, "arrow.ply", text);
-    let area: f32 = mesh
-        .triangles
-        .iter()
-        .map(|triangle| {
+    let areas = |outline: &[[f32; 2]]| -> Vec<f32> {
+        let count = outline.len();
+        let corners: String = (0..count).map(|at| format!(" {at}")).collect();
+        let points: String = outline.iter().map(|[x, y]| format!("{x} {y} 0\n")).collect();
+        let text = format!(
+            "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\n\
+             element vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
+             end_header\n{count}{corners}\n{points}"
+        );
+        let mesh = read(&folder, "a.ply", text);
+        assert_eq!(mesh.triangles.len(), count - 2);
+        let area = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|index| Vec3::from_array(mesh.positions[index as usize]));
-            let area = 0.5 * (b - a).cross(c - a).z;
-            assert!(area > 0.0, "a triangle is turned over");
-            area
-        })
-        .sum();
-    assert!((area - 2.5).abs() < 1e-6, "{area}");
+            0.5 * (b - a).cross(c - a).z
+        };
+        mesh.triangles.iter().map(area).collect()
+    };
+    let arrow = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 0.5], [0.0, 2.0]];
+    let comb = [
+        [[0.0, 0.0], [5.0, 0.0], [5.0, 3.0], [4.0, 3.0], [4.0, 1.0], [3.0, 1.0]],
+        [[3.0, 3.0], [2.0, 3.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]],
+    ];
+    for (outline, expected) in [(&arrow[..], 2.5), (comb.as_flattened(), 11.0)] {
+        for turn in [1.0, -1.0] {
+            let mut outline = outline.to_vec();
+            if turn < 0.0 {
+                outline.reverse();
+            }
+            let found = areas(&outline);
+            assert!(found.iter().all(|area| turn * area > 0.0), "a triangle is turned over");
+            assert!((found.iter().sum::<f32>() - turn * expected).abs() < 1e-5, "{found:?}");
+        }
+    }
+    // An outline that crosses itself is closed all the same.
+    areas(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]);
 }
 
 #[test]

@@ -321,6 +321,8 @@ fn impossible_parameters_name_the_key_and_the_value() {
     assert!(message(inside_out).contains("radii of 0 or more, found -1"));
     let bow_tie = shape("extrude", "depth = 1\noutline = [[0,0],[1,1],[1,0],[0,1]]");
     assert!(message(bow_tie).contains("does not cross"));
+    let spike = shape("extrude", "depth = 1\noutline = [[0,0],[2,0],[1,0],[1,1]]");
+    assert!(message(spike).contains("does not cross"));
     let narrow =
         shape("extrude", "depth = 1\nbevel = 0.2\noutline = [[0,0],[1,0],[1,0.1],[0,0.1]]");
     assert!(message(narrow).contains("too large for the narrow parts"));

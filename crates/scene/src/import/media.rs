@@ -142,36 +142,3 @@ const ILLUMINANTS: [(&str, f64, f64); 16] = [
     ("stdillum-F11", 0.3805, 0.3769),
     ("stdillum-F12", 0.4370, 0.4042),
 ];
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_white_of_rec_709_is_white() {
-        let white = illuminant("stdillum-D65").unwrap_or_default();
-        assert!((white - DVec3::ONE).abs().max_element() < 1e-3, "{white}");
-    }
-
-    /// Gold is yellow, copper red, silver and aluminium almost white.
-    #[test]
-    fn metals_have_their_colours() {
-        let reflectance = |metal: &str| {
-            let part = |part: &str| index(&format!("metal-{metal}-{part}")).unwrap_or_default();
-            let (eta, k) = (part("eta"), part("k"));
-            ((eta - 1.0) * (eta - 1.0) + k * k) / ((eta + 1.0) * (eta + 1.0) + k * k)
-        };
-        let expected = [
-            ("Ag", dvec3(0.97, 0.96, 0.91)),
-            ("Al", dvec3(0.91, 0.92, 0.92)),
-            ("Au", dvec3(0.98, 0.78, 0.34)),
-            ("Cu", dvec3(0.96, 0.64, 0.54)),
-        ];
-        for (metal, color) in expected {
-            let found = reflectance(metal);
-            assert!((found - color).abs().max_element() < 0.01, "{metal}: {found}");
-        }
-        assert_eq!(index("metal-Cu-x"), None);
-        assert_eq!(index("glass-BK7"), Some(DVec3::splat(1.5168)));
-    }
-}

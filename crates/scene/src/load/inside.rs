@@ -195,39 +195,3 @@ impl Grid {
         ways.filter(|sight| !sight.leaves).map(|sight| sight.cells).fold(f32::INFINITY, f32::min)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
-    use super::*;
-    use crate::{mesh::Mesh, quadrics, transform::Transform};
-
-    /// Rooms one on the other, together 8 × 3 × 4 m, whose walls look inwards or outwards.
-    fn room(looks_in: bool, storeys: usize) -> Geometry {
-        let mut cube: Mesh = quadrics::cube();
-        if looks_in {
-            cube.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-        }
-        let mut geometry = Geometry::default();
-        for storey in 0..storeys {
-            let height = 0.5 * 3.0 / storeys as f32;
-            let middle = [0.0, (2 * storey + 1) as f32 * height, 0.0];
-            let place = Transform::new([4.0, height, 2.0], [0.0; 3], middle);
-            geometry.append(&cube, &place, |_| 0);
-        }
-        geometry
-    }
-
-    #[test]
-    fn a_room_is_seen_from_inside_and_a_box_is_not() {
-        let (low, high) = (Vec3::new(-4.0, 0.0, -2.0), Vec3::new(4.0, 3.0, 2.0));
-        let View { from, at } = view(&room(true, 1), low, high).unwrap();
-        assert!((from.y - EYE_HEIGHT).abs() < 0.2, "{from}");
-        assert!(from.cmpgt(low).all() && from.cmplt(high).all(), "{from}");
-        let along = (at - from).normalize();
-        assert!(along.x.abs() > 0.9 && (at - from).length() > 4.0, "{from} {at}");
-        assert!(view(&room(false, 1), low, high).is_none());
-        assert!(view(&room(true, 4), low, high).is_none(), "shelves");
-    }
-}

@@ -51,35 +51,3 @@ pub(crate) fn monotone(times: &[f32], value: impl Fn(usize) -> f32, place: Betwe
         false => hermite([value(first), value(second)], [slope(first), slope(second)], place),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const TIMES: [f32; 4] = [0.0, 1.0, 1.5, 3.0];
-
-    fn curve(values: [f32; 4], time: f32) -> f32 {
-        monotone(&TIMES, |key| values[key], between(&TIMES, time))
-    }
-
-    #[test]
-    fn the_curve_passes_its_keys_and_does_not_overshoot() {
-        let values = [1.0, 4.0, 4.0, -2.0];
-        for (time, value) in TIMES.into_iter().zip(values) {
-            assert_eq!(curve(values, time), value);
-        }
-        assert_eq!([curve(values, -1.0), curve(values, 1.2), curve(values, 9.0)], [1.0, 4.0, -2.0]);
-        for step in 0..300 {
-            let found = curve(values, 0.01 * step as f32);
-            assert!((-2.0..=4.0).contains(&found), "{found}");
-        }
-        // A straight line stays one, and the slope is the same on both sides of a key.
-        assert!((curve([0.0, 2.0, 3.0, 6.0], 2.2) - 4.4).abs() < 1e-5);
-        let rising = [0.0, 1.0, 5.0, 6.0];
-        let slope = |from: f32| (curve(rising, from + 1e-3) - curve(rising, from)) / 1e-3;
-        assert!((slope(1.0) - slope(1.0 - 1e-3)).abs() < 0.05, "{} {}", slope(1.0), slope(0.999));
-        // By the lengths of both stretches: 1 s at 1 per second, then 0.5 s at 8.
-        let expected = 3.0 * 1.5 / ((2.0 * 0.5 + 1.0) / 1.0 + (0.5 + 2.0 * 1.0) / 8.0);
-        assert!((slope(1.0) - expected).abs() < 0.05, "{} {expected}", slope(1.0));
-    }
-}

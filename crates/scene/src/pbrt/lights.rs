@@ -280,29 +280,3 @@ fn upper_illuminance(texels: &[Vec3], side: u32) -> f64 {
         .sum();
     4.0 * PI * sum / texels.len() as f64
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::equal_area::square_from_direction;
-
-    #[test]
-    fn a_white_map_gives_an_illuminance_of_pi() {
-        assert!((upper_illuminance(&[Vec3::ONE; 64 * 64], 64) - PI).abs() < 0.01);
-        // So does either half of it give half of that.
-        let left: Vec<_> =
-            (0..64 * 64).map(|at| if at % 64 < 32 { Vec3::ONE } else { Vec3::ZERO }).collect();
-        assert!((upper_illuminance(&left, 64) - 0.5 * PI).abs() < 0.01);
-        // Above the horizon is inside the diamond.
-        let uv = square_from_direction(Vec3::new(0.6, 0.0, 0.8));
-        assert!((uv.x - 0.5).abs() + (uv.y - 0.5).abs() < 0.5);
-    }
-
-    #[test]
-    fn small_maps_are_repeated_to_the_size_of_large_ones() {
-        let texels = [1.0, 2.0, 3.0, 4.0].map(Vec3::splat).to_vec();
-        let large = enlarge(texels, 2, 4);
-        assert_eq!(large.len(), 16);
-        assert_eq!([large[0].x, large[3].x, large[4].x, large[15].x], [1.0, 2.0, 1.0, 4.0]);
-    }
-}

@@ -116,18 +116,3 @@ pub(super) fn index(parameter: &Parameter, folder: &Folder) -> Result<Vec3> {
 fn blackbody(kelvin: f64) -> DVec3 {
     light_color(|nm| planck(nm, kelvin)).unwrap_or(DVec3::ZERO)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn black_bodies_have_their_known_colours() {
-        // The white of D65 lies beside the black body of 6504 K, towards green.
-        let white = blackbody(6504.0);
-        assert!((white - DVec3::ONE).abs().max_element() < 0.06, "{white}");
-        // Illuminant A is a black body of 2856 K: x = 0.4476, y = 0.4074.
-        let warm = media::illuminant("stdillum-A").unwrap_or_default();
-        assert!((blackbody(2856.0) - warm).abs().max_element() < 0.01, "{warm}");
-    }
-}

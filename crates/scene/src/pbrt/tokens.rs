@@ -207,60 +207,11 @@ fn available<'a>(reader: &'a mut impl BufRead, place: &Place, most: u64) -> Resu
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
 
-    fn tokens(text: &[u8]) -> Tokens<&[u8]> {
-        Tokens::new(Path::new("a.pbrt").into(), text, 1 << 20)
-    }
-
-    fn all(text: &str) -> Vec<(Token, String, usize, usize)> {
-        let mut tokens = tokens(text.as_bytes());
-        let mut found = Vec::new();
-        while let Some(token) = tokens.next().unwrap() {
-            let place = tokens.place.clone();
-            found.push((token, tokens.text.to_owned(), place.line, place.column));
-        }
-        found
-    }
-
     #[test]
-    fn words_strings_brackets_and_comments() {
-        let found = all("A\"b c\"[1 -.5e3]# note \"[\n \"q\\\"\\\\\"x");
-        let expected = [
-            (Token::Word, "A", 1, 1),
-            (Token::Text, "b c", 1, 2),
-            (Token::Open, "", 1, 7),
-            (Token::Word, "1", 1, 8),
-            (Token::Word, "-.5e3", 1, 10),
-            (Token::Close, "", 1, 15),
-            (Token::Text, "q\"\\", 2, 2),
-            (Token::Word, "x", 2, 9),
-        ];
-        let expected = expected.map(|(token, text, line, at)| (token, text.to_owned(), line, at));
-        assert_eq!(found, expected);
-    }
-
-    #[test]
-    fn bad_text_is_an_error_with_its_place() {
-        let message = |text: &[u8]| {
-            let mut tokens = tokens(text);
-            loop {
-                match tokens.next() {
-                    Ok(Some(_)) => {}
-                    Ok(None) => return None,
-                    Err(error) => return Some(error.to_string()),
-                }
-            }
-        };
-        let found = message(b"a\n \"b\nc\"").unwrap();
-        assert!(found.starts_with("a.pbrt:2:2: expected a closing quote"), "{found}");
-        assert!(message(b"\"b").unwrap().contains("a.pbrt:1:1: expected a closing quote"));
-        assert!(message(b"\"\\q\"").unwrap().contains("after \\, found q"));
-        assert!(message(b"\xff").unwrap().contains("UTF-8"));
-        assert!(message(&[b'x'; MAX_LENGTH + 1]).unwrap().contains("at most"));
-        let mut short = Tokens::new(Path::new("a.pbrt").into(), &b"abc"[..], 2);
-        assert!(short.next().is_err());
+    fn bytes_are_bounded() {
+        let mut tokens = Tokens::new(Path::new("a.pbrt").into(), &b"abc"[..], 2);
+        assert!(tokens.next().is_err());
     }
 }

@@ -178,27 +178,3 @@ impl Buffer {
         self.accessors.len() - 1
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn matrices_are_scale_turn_and_shift() {
-        for (scale, angle) in [([2.0, 3.0], 0.5_f32), ([1.0, -1.0], 0.0), ([-2.0, 0.5], 3.0)] {
-            let (sine, cosine) = angle.sin_cos();
-            let [x, y]: [f32; 2] = scale;
-            let matrix = [[cosine * x, sine * y, 0.25], [-sine * x, cosine * y, 0.75]];
-            let (found, is_exact) = transform(matrix);
-            let found = found.unwrap_or_default();
-            let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN) as f32;
-            let (sine, cosine) = number(&found["rotation"]).sin_cos();
-            let [x, y] = [0, 1].map(|axis| number(&found["scale"][axis]));
-            let again = [[cosine * x, sine * y, 0.25], [-sine * x, cosine * y, 0.75]];
-            let pairs = matrix.iter().flatten().zip(again.iter().flatten());
-            assert!(is_exact && pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-5), "{found}");
-        }
-        assert!(!transform([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0]]).1);
-        assert_eq!(transform(SAME_UV), (None, true));
-    }
-}

@@ -138,23 +138,3 @@ fn image_from_uv(transform: &Value) -> [[f32; 3]; 2] {
     let (sine, cosine) = number(transform, "rotation", 0.0).sin_cos();
     [[cosine * scale_u, sine * scale_v, offset_u], [-sine * scale_u, cosine * scale_v, offset_v]]
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn transforms_turn_as_the_khronos_model_shows() {
-        // The tip of its arrow is at 7/9 of the image; its marks for the right place of the tip are
-        // the children of the nodes "Rotation" and "All", relative to the upper left corner.
-        let tip = |transform: Value, [u, v]: [f32; 2]| {
-            image_from_uv(&transform).map(|row| row[0] * u + row[1] * v + row[2])
-        };
-        let turned =
-            tip(serde_json::json!({"rotation": std::f32::consts::FRAC_PI_8}), [0.421, 1.016]);
-        let all = serde_json::json!({"rotation": 0.3, "scale": [1.5, 1.5], "offset": [-0.2, -0.1]});
-        for place in [turned, tip(all, [0.43, 0.75])] {
-            assert!(place.iter().all(|coordinate| (coordinate - 0.77).abs() < 0.03), "{place:?}");
-        }
-    }
-}

@@ -136,28 +136,3 @@ impl Map {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn options_stand_before_a_name_with_spaces() {
-        let (name, options, unknown) = parse(
-            "-s 2 3 1 -o 0.5 -clamp on -bm 0.3 -blendu off -mm 0.1 0.8 -imfchan g my oak.png",
-        );
-        assert_eq!((name, unknown), ("my oak.png", vec!["-blendu"]));
-        let expected = Options {
-            scale: [2.0, 3.0],
-            offset: [0.5, 0.0],
-            clamps: true,
-            base_gain: [0.1, 0.8],
-            channels: Some(Channels::Green),
-            strength: 0.3,
-        };
-        assert_eq!(options, expected);
-        for text in ["oak.png", "-oak.png", "2.png", "-s 2 2.png", ""] {
-            assert_eq!(parse(text).0, text.strip_prefix("-s 2 ").unwrap_or(text));
-        }
-    }
-}
