@@ -31,7 +31,9 @@ struct Open {
 pub(super) struct Source {
     /// Folder of the main file, to which all paths are relative.
     pub(super) folder: Folder,
-    stack: Vec<Open>,
+    open: Open,
+    /// Files that include the open one, the main file first.
+    outer: Vec<Open>,
     /// Last token, if it is to be read again.
     held: Option<Token>,
     pub inputs: Vec<PathBuf>,
@@ -53,9 +55,8 @@ impl Source {
     /// # Errors
     /// [`Io`](crate::error::Error::Io), and [`Format`](crate::error::Error::Format) for a device.
     pub(super) fn open(path: &Path, folder: Folder) -> Result<Self> {
-        let first = Open { tokens: open(path, MAX_BYTES)?, restores: false };
-        let inputs = vec![path.into()];
-        Ok(Self { folder, stack: vec![first], held: None, inputs })
+        let open = Open { tokens: open(path, MAX_BYTES)?, restores: false };
+        Ok(Self { folder, open, outer: Vec::new(), held: None, inputs: vec![path.into()] })
     }
 
     /// Next token, or the end of an imported file or of everything.
@@ -64,18 +65,13 @@ impl Source {
             return Ok(Part::Token(token));
         }
         loop {
-            let Some(open) = self.stack.last_mut() else { return Ok(Part::End) };
-            if let Some(token) = open.tokens.next()? {
+            if let Some(token) = self.open.tokens.next()? {
                 return Ok(Part::Token(token));
             }
-            if self.stack.len() == 1 {
-                return Ok(Part::End);
-            }
-            let Some(closed) = self.stack.pop() else { return Ok(Part::End) };
+            let Some(outer) = self.outer.pop() else { return Ok(Part::End) };
+            let closed = std::mem::replace(&mut self.open, outer);
             // All files together have so many bytes.
-            if let Some(open) = self.stack.last_mut() {
-                open.tokens.bytes_left = closed.tokens.bytes_left;
-            }
+            self.open.tokens.bytes_left = closed.tokens.bytes_left;
             if closed.restores {
                 return Ok(Part::EndOfImport);
             }
@@ -84,10 +80,7 @@ impl Source {
 
     /// Next token of the file in hand; none at its end, which stays to be read by `next`.
     pub(super) fn next_here(&mut self) -> Result<Option<Token>> {
-        match (self.held.take(), self.stack.last_mut()) {
-            (None, Some(open)) => open.tokens.next(),
-            (held, _) => Ok(held),
-        }
+        self.held.take().map_or_else(|| self.open.tokens.next(), |held| Ok(Some(held)))
     }
 
     /// Returns the last token to be read again.
@@ -97,34 +90,32 @@ impl Source {
 
     /// Characters of the last token.
     pub(super) fn text(&self) -> &str {
-        self.stack.last().map_or("", |open| &open.tokens.text)
+        &self.open.tokens.text
     }
 
     /// Place of the last token.
     pub(super) fn place(&self) -> Place {
-        match self.stack.last() {
-            Some(open) => open.tokens.place.clone(),
-            None => Place { path: Rc::from(&*self.folder.path), line: 0, column: 0 },
-        }
+        self.open.tokens.place.clone()
     }
 
     /// Goes on with another file, until its end. `restores` marks an import.
     pub(super) fn include(&mut self, name: &str, restores: bool, place: &Place) -> Result<()> {
         let path = self.folder.file(name).map_err(|message| place.error(message))?;
-        if self.stack.iter().any(|open| files::is_same_file(&open.tokens.place.path, &path)) {
+        let is_it = |open: &Open| files::is_same_file(&open.tokens.place.path, &path);
+        if is_it(&self.open) || self.outer.iter().any(is_it) {
             return Err(place.error(format!("`{name}` includes itself")));
         }
-        if self.stack.len() == MAX_DEPTH {
+        if self.outer.len() + 1 == MAX_DEPTH {
             let message = format!("more than {MAX_DEPTH} files include one another");
             return Err(place.error(message));
         }
         if self.inputs.len() > MAX_INCLUDES {
             return Err(place.error(format!("more than {MAX_INCLUDES} files are included")));
         }
-        let left = self.stack.last().map_or(MAX_BYTES, |open| open.tokens.bytes_left);
-        let tokens = open(&path, left).map_err(|error| place.error(error.to_string()))?;
+        let tokens = open(&path, self.open.tokens.bytes_left)
+            .map_err(|error| place.error(error.to_string()))?;
         self.inputs.push(path);
-        self.stack.push(Open { tokens, restores });
+        self.outer.push(std::mem::replace(&mut self.open, Open { tokens, restores }));
         Ok(())
     }
 }
