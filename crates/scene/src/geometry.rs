@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use glam::Vec3;
+
 use super::{
     instance::Instance,
     mesh::{Mesh, ObjectStart, start_object},
@@ -107,7 +109,40 @@ impl DroppedOfMany {
     }
 }
 
+/// Checks that no position lies too far out for traversal.
+///
+/// # Errors
+/// A message that names the largest coordinate.
+pub(crate) fn check_extent(positions: impl IntoIterator<Item = Vec3>) -> Result<(), String> {
+    let distances = positions.into_iter().map(|position| position.abs().max_element());
+    let farthest = distances.fold(0.0, f32::max);
+    if farthest <= MAX_COORDINATE {
+        return Ok(());
+    }
+    Err(format!(
+        "a vertex has the coordinate {farthest:e}; expected at most {MAX_COORDINATE:e} m: scale or move \
+         the object"
+    ))
+}
+
 impl Geometry {
+    /// Counts vertices and triangles with as many further ones, which 32-bit indices must address.
+    ///
+    /// # Errors
+    /// A message with both numbers.
+    pub(crate) fn counts_with(
+        &self,
+        vertices: usize,
+        triangles: usize,
+    ) -> Result<[usize; 2], String> {
+        let [vertices, triangles] =
+            [self.positions.len() + vertices, self.triangles.len() + triangles];
+        u32::try_from(vertices.max(triangles)).map(|_| [vertices, triangles]).map_err(|_| {
+            let most = u32::MAX;
+            format!("{vertices} vertices and {triangles} triangles, at most {most} can be used")
+        })
+    }
+
     /// Starts an object: it has the triangles and instances that are added from now on.
     pub fn start_object(&mut self, name: &str) {
         let (name, first_triangle) = (name.to_owned(), self.triangles.len());
@@ -208,7 +243,7 @@ fn is_finite<const N: usize>(vector: [f32; N]) -> bool {
 
 /// Tests whether single precision resolves the direction of a triangle's normal.
 fn has_normal(corners: [[f32; 3]; 3]) -> bool {
-    let [a, b, c] = corners.map(glam::Vec3::from_array);
+    let [a, b, c] = corners.map(Vec3::from_array);
     let squared = (b - a).cross(c - a).length_squared();
     squared.is_finite() && squared >= f32::MIN_POSITIVE
 }

@@ -13,7 +13,7 @@ use crate::{
     error::{Error, Result},
     features::{self, Ignored},
     file::{ObjectEntry, ObjectKeys, ObjectSource},
-    geometry::MAX_COORDINATE,
+    geometry::check_extent,
     instance::{Budget, Instance},
     instances::Prototype,
     material::Material,
@@ -199,14 +199,8 @@ impl Loader<'_> {
         vertices: usize,
         triangles: usize,
     ) -> Result<()> {
-        let vertices = geometry.positions.len() + vertices;
-        let triangles = geometry.triangles.len() + triangles;
-        self.check(u32::try_from(vertices).is_ok() && u32::try_from(triangles).is_ok(), || {
-            format!(
-                "{vertices} vertices and {triangles} triangles, at most {} can be used",
-                u32::MAX
-            )
-        })?;
+        let counts = geometry.counts_with(vertices, triangles);
+        let [vertices, triangles] = counts.map_err(|message| self.error(message))?;
         let vertex_bytes = (vertices as u64).saturating_mul(VERTEX_BYTES);
         let triangle_bytes = (triangles as u64).saturating_mul(TRIANGLE_BYTES);
         let asker = format_args!("{}: {triangles} triangles", self.path.display());
@@ -233,14 +227,7 @@ impl Loader<'_> {
         label: &str,
         positions: impl IntoIterator<Item = Vec3>,
     ) -> Result<()> {
-        let distances = positions.into_iter().map(|position| position.abs().max_element());
-        let farthest = distances.fold(0.0, f32::max);
-        self.check(farthest <= MAX_COORDINATE, || {
-            format!(
-                "{label}: a vertex has the coordinate {farthest:e}; expected at most \
-                 {MAX_COORDINATE:e} m: scale or move the object"
-            )
-        })
+        check_extent(positions).map_err(|message| self.error(format!("{label}: {message}")))
     }
 
     /// Appends an object to the geometry, as an instance of `prototype` or placed, with the materials

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     error::Result,
     features, files,
-    geometry::MAX_COORDINATE,
+    geometry::check_extent,
     instance::{Instance, MAX_INSTANCES},
     mesh::Mesh,
     quadrics,
@@ -54,19 +54,6 @@ impl Shape {
         }
         Cow::Owned(mesh)
     }
-}
-
-/// Rejects a shape that lies too far out for traversal.
-fn check_extent(node: Node<'_>, positions: impl IntoIterator<Item = Vec3>) -> Result<()> {
-    let farthest = positions.into_iter().map(|position| position.abs().max_element());
-    let farthest = farthest.fold(0.0, f32::max);
-    if farthest > MAX_COORDINATE {
-        return Err(node.error(format!(
-            "a vertex has the coordinate {farthest:e}; expected at most {MAX_COORDINATE:e} m: scale \
-             or move the shape"
-        )));
-    }
-    Ok(())
 }
 
 impl Reader {
@@ -152,7 +139,7 @@ impl Reader {
         else {
             return self.append(node, shape, matrix);
         };
-        check_extent(node, prototype.corners(&instance))?;
+        check_extent(prototype.corners(&instance)).map_err(|message| node.error(message))?;
         self.geometry.instances.push(instance);
         Ok(())
     }
@@ -179,18 +166,13 @@ impl Reader {
     fn append(&mut self, node: Node<'_>, shape: &Shape, matrix: DMat4) -> Result<()> {
         let transform = placement(node, matrix)?;
         let first_vertex = self.geometry.positions.len();
-        let vertices = first_vertex + shape.mesh.positions.len();
-        let triangles = self.geometry.triangles.len() + shape.mesh.triangles.len();
-        if u32::try_from(vertices).is_err() || u32::try_from(triangles).is_err() {
-            let limit = u32::MAX;
-            return Err(node.error(format!(
-                "{vertices} vertices and {triangles} triangles, at most {limit} can be used"
-            )));
-        }
         let mesh = shape.turned(transform.mirrors);
+        let counts = self.geometry.counts_with(mesh.positions.len(), mesh.triangles.len());
+        counts.map_err(|message| node.error(message))?;
         let dropped = self.geometry.append(&mesh, &transform, |_| shape.material);
         self.dropped.add(dropped, mesh.triangles.len(), || format!("shape of {}", node.place()));
-        check_extent(node, self.geometry.positions[first_vertex..].iter().copied().map(Vec3::from))
+        let placed = self.geometry.positions[first_vertex..].iter().copied().map(Vec3::from);
+        check_extent(placed).map_err(|message| node.error(message))
     }
 
     fn read_shape(&mut self, node: Node<'_>) -> Result<Shape> {
