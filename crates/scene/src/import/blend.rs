@@ -113,11 +113,12 @@ fn blend_lobes(
     let share = share_image.map_or(share.clone(), |image| factor(Some(image)));
     let [own_factors, other_factors] = [own_images, other_images].map(|images| images.map(factor));
     let lobes = |kind: &MaterialKind, factors: &[Value; 3], index: usize| {
-        let [color, rough, metal] = factors.each_ref().map(|factor| factor.at(&grid, index));
+        let [color, rough, metal] =
+            factors.each_ref().map(|factor| factor.at(&grid, index).truncate());
         Lobes::of(&kind.scaled(color, luminance(rough), luminance(metal))).unwrap_or_default()
     };
     let mixture = |index: usize| {
-        let share = luminance(share.at(&grid, index)).clamp(0.0, 1.0);
+        let share = luminance(share.at(&grid, index).truncate()).clamp(0.0, 1.0);
         let pair = [lobes(first, &own_factors, index), lobes(second, &other_factors, index)];
         Lobes::mixed(pair, share)
     };

@@ -8,7 +8,7 @@ pub(crate) mod relief;
 
 use std::path::PathBuf;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 
 use crate::{
     Asked, EnvironmentMap, FilmSettings, Geometry, Lamp,
@@ -83,11 +83,16 @@ impl Value {
         }
     }
 
-    /// Value at a texel of a grid that the image, if it is one, lies on.
-    pub(crate) fn at(&self, grid: &Texelwise, index: usize) -> Vec3 {
+    /// Image, or 1 without one, times a factor.
+    pub(crate) fn of(image: Option<TextureUse>, factor: Vec3) -> Self {
+        image.map_or(Self::Constant(Vec3::ONE), Self::Image).affine(factor, Vec3::ZERO)
+    }
+
+    /// Value and opacity at a texel of a grid that the image, if it is one, lies on.
+    pub(crate) fn at(&self, grid: &Texelwise, index: usize) -> Vec4 {
         match self {
-            Self::Constant(value) => *value,
-            Self::Image(image) => grid.texel(image, index).truncate(),
+            Self::Constant(value) => value.extend(1.0),
+            Self::Image(image) => grid.texel(image, index),
         }
     }
 
@@ -107,7 +112,7 @@ impl Value {
             value => value,
         });
         let grid = Texelwise::of(&values.each_ref().map(Self::image));
-        let value = |index| of(values.each_ref().map(|value| value.at(&grid, index)));
+        let value = |index| of(values.each_ref().map(|value| value.at(&grid, index).truncate()));
         let combined = match place {
             Some(_) => Self::Image(grid.color(value)),
             None => Self::Constant(value(0)),

@@ -1,18 +1,21 @@
 //! Materials of a glTF document → materials of a scene.
 
 use glam::{Vec2, Vec3};
-use serde_json::Value;
+use serde_json::Value as Json;
 
-use super::{GltfReader, contents::ignore_extensions, glossiness};
+use super::{GltfReader, contents::ignore_extensions};
 use crate::{
     coat::COAT_IOR,
     error::Result,
     features::{self, Feature, Ignored},
     gloss::{DEFAULT_IOR, DIELECTRIC, metallic_roughness},
-    import,
+    import::{Value, sheet},
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
     mesh::{MeshMaterial, images::opacity_of, label},
-    texture::{Channels, Encoding, TextureUse, texelwise::lie_alike},
+    texture::{
+        Channels, Encoding, TextureUse,
+        texelwise::{Texelwise, lie_alike},
+    },
 };
 
 const COLOR: (Channels, Encoding) = (Channels::Color, Encoding::Srgb);
@@ -33,13 +36,13 @@ const VISIBLE_ROUGHNESS: f32 = 0.05;
 const STRONGEST_DIELECTRIC: f32 = 0.08;
 
 /// Reads a finite number; `default` if it is absent.
-pub(super) fn number(json: &Value, key: &str, default: f32) -> f32 {
+pub(super) fn number(json: &Json, key: &str, default: f32) -> f32 {
     let number = json[key].as_f64().map(|number| number as f32);
     number.filter(|number| number.is_finite()).unwrap_or(default)
 }
 
 /// Reads a vector of finite numbers; `default` if it is absent.
-pub(super) fn vector<const N: usize>(json: &Value, key: &str, default: [f32; N]) -> [f32; N] {
+pub(super) fn vector<const N: usize>(json: &Json, key: &str, default: [f32; N]) -> [f32; N] {
     let Some(numbers) = json[key].as_array().filter(|numbers| numbers.len() >= N) else {
         return default;
     };
@@ -51,30 +54,30 @@ pub(super) fn vector<const N: usize>(json: &Value, key: &str, default: [f32; N])
     vector
 }
 
-fn share(json: &Value, key: &str, default: f32) -> f32 {
+fn share(json: &Json, key: &str, default: f32) -> f32 {
     number(json, key, default).clamp(0.0, 1.0)
 }
 
 /// Reads a colour with components from 0 to 1.
-fn color(json: &Value, key: &str, default: [f32; 3]) -> Vec3 {
+fn color(json: &Json, key: &str, default: [f32; 3]) -> Vec3 {
     Vec3::from_array(vector(json, key, default)).clamp(Vec3::ZERO, Vec3::ONE)
 }
 
 /// Material while it is read.
 pub(super) struct Reading<'a> {
-    json: &'a Value,
+    json: &'a Json,
     /// Number or name, for messages.
     pub(super) place: String,
     ignored: Ignored,
 }
 
 impl<'a> Reading<'a> {
-    fn new(json: &'a Value, index: usize) -> Self {
+    fn new(json: &'a Json, index: usize) -> Self {
         let place = label("material", index, json["name"].as_str());
         Self { json, place, ignored: Ignored::default() }
     }
 
-    fn extension(&self, name: &str) -> &Value {
+    fn extension(&self, name: &str) -> &Json {
         &self.json["extensions"][name]
     }
 
@@ -279,16 +282,21 @@ impl GltfReader<'_> {
             return Ok(Reflection { kind, surface, base_color, alpha });
         }
         let mut principled = Principled { roughness, ..Principled::default() };
-        let scaled = |used: TextureUse, scale: Vec3| TextureUse { scale: scale.into(), ..used };
-        let diffuse = surface.color.take().map(|own| scaled(own, base_color)).ok_or(base_color);
         let has_gloss_image = specular.is_some();
-        let specular = specular.map(|own| scaled(own, specular_color)).ok_or(specular_color);
-        if let (Err(diffuse), Err(specular)) = (&diffuse, &specular) {
-            let (base_color, metallic) = metallic_roughness(*diffuse, *specular);
+        if surface.color.is_none() && !has_gloss_image {
+            let (base_color, metallic) = metallic_roughness(base_color, specular_color);
             let kind = MaterialKind::Principled(Principled { base_color, metallic, ..principled });
             return Ok(Reflection { kind, surface, base_color, alpha });
         }
-        let converted = glossiness::convert(&diffuse, &specular, glossiness);
+        let diffuse = Value::of(surface.color.take(), base_color);
+        let specular = Value::of(specular, specular_color);
+        let grid = Texelwise::of(&[diffuse.image(), specular.image()]);
+        // The alpha of the specular image is a factor of the glossiness.
+        let converted = grid.material(|index| {
+            let (color, gloss) = (diffuse.at(&grid, index), specular.at(&grid, index));
+            let (base, metallic) = metallic_roughness(color.truncate(), gloss.truncate());
+            (base.extend(color.w), 1.0 - glossiness * gloss.w, metallic)
+        });
         surface.color = Some(converted.base_color);
         surface.metallic = Some(converted.metallic);
         if has_gloss_image {
@@ -300,7 +308,7 @@ impl GltfReader<'_> {
     }
 
     /// Surface with a texture of colour and opacity.
-    fn colored(&mut self, info: &Value, reading: &mut Reading) -> Result<Surface> {
+    fn colored(&mut self, info: &Json, reading: &mut Reading) -> Result<Surface> {
         let color = self.texture(info, COLOR, reading)?;
         let texture = color.as_ref().and_then(opacity_of);
         let opacity = Opacity { texture, ..Opacity::default() };
@@ -379,23 +387,17 @@ impl GltfReader<'_> {
         if factor * below < LEAST_TRANSMISSION {
             return Ok(());
         }
-        let of_image = |image: Option<TextureUse>, factor: Vec3| {
-            let whole = image.map_or(import::Value::Constant(Vec3::ONE), import::Value::Image);
-            whole.affine(factor, Vec3::ZERO)
-        };
         let through = self.texture(&model["diffuseTransmissionTexture"], ALPHA, reading)?;
         let tint = self.texture(&model["diffuseTransmissionColorTexture"], COLOR, reading)?;
         let tint_factor = color(model, "diffuseTransmissionColorFactor", [1.0; 3]);
-        let through = of_image(through, Vec3::splat(factor));
-        let base = of_image(found.surface.color.take(), below * base_color);
-        let tint = of_image(tint, below * tint_factor);
-        let (reflected, is_mean) =
-            import::Value::combined([base, through.clone()], |[base, through]| {
-                base * (1.0 - through)
-            });
+        let through = Value::of(through, Vec3::splat(factor));
+        let base = Value::of(found.surface.color.take(), below * base_color);
+        let tint = Value::of(tint, below * tint_factor);
+        let reflected = |[base, through]: [Vec3; 2]| base * (1.0 - through);
+        let (reflected, is_mean) = Value::combined([base, through.clone()], reflected);
         let (transmitted, is_tint_mean) =
-            import::Value::combined([tint, through], |[tint, through]| tint * through);
-        let (kind, image, is_ratio_mean) = import::sheet([reflected, transmitted]);
+            Value::combined([tint, through], |[tint, through]| tint * through);
+        let (kind, image, is_ratio_mean) = sheet([reflected, transmitted]);
         let has_volume = !json["extensions"]["KHR_materials_volume"].is_null();
         let is_bare = specular == 0.0 && below == 1.0 && !has_volume;
         let has_own_pattern = is_mean || is_tint_mean || is_ratio_mean;

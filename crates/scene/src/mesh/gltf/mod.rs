@@ -9,7 +9,6 @@ mod animation;
 mod compression;
 mod contents;
 mod document;
-mod glossiness;
 mod lamps;
 mod material;
 mod primitive;
