@@ -119,10 +119,8 @@ pub(crate) fn check_extent(positions: impl IntoIterator<Item = Vec3>) -> Result<
     if farthest <= MAX_COORDINATE {
         return Ok(());
     }
-    Err(format!(
-        "a vertex has the coordinate {farthest:e}; expected at most {MAX_COORDINATE:e} m: scale or move \
-         the object"
-    ))
+    let expected = format!("expected at most {MAX_COORDINATE:e} m: scale or move the object");
+    Err(format!("a vertex has the coordinate {farthest:e}; {expected}"))
 }
 
 impl Geometry {
@@ -130,13 +128,9 @@ impl Geometry {
     ///
     /// # Errors
     /// A message with both numbers.
-    pub(crate) fn counts_with(
-        &self,
-        vertices: usize,
-        triangles: usize,
-    ) -> Result<[usize; 2], String> {
-        let [vertices, triangles] =
-            [self.positions.len() + vertices, self.triangles.len() + triangles];
+    pub(crate) fn counts(&self, vertices: usize, triangles: usize) -> Result<[usize; 2], String> {
+        let (vertices, triangles) =
+            (self.positions.len() + vertices, self.triangles.len() + triangles);
         u32::try_from(vertices.max(triangles)).map(|_| [vertices, triangles]).map_err(|_| {
             let most = u32::MAX;
             format!("{vertices} vertices and {triangles} triangles, at most {most} can be used")

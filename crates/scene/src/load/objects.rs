@@ -199,7 +199,7 @@ impl Loader<'_> {
         vertices: usize,
         triangles: usize,
     ) -> Result<()> {
-        let counts = geometry.counts_with(vertices, triangles);
+        let counts = geometry.counts(vertices, triangles);
         let [vertices, triangles] = counts.map_err(|message| self.error(message))?;
         let vertex_bytes = (vertices as u64).saturating_mul(VERTEX_BYTES);
         let triangle_bytes = (triangles as u64).saturating_mul(TRIANGLE_BYTES);

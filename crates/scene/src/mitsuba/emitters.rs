@@ -23,23 +23,17 @@ impl Reader {
     /// Reads an emitter that belongs to no shape.
     pub(super) fn emitter(&mut self, node: Node<'_>) -> Result<()> {
         let parameters = Parameters::new(node);
-        let kind = match node.kind() {
+        let map = match node.kind() {
             "constant" => {
-                let radiance = light(&parameters, "radiance")?;
-                let map = EnvironmentMap::constant(radiance, 1.0);
-                self.surround(node, map.map_err(|message| node.error(message))?)?;
-                None
+                let map = EnvironmentMap::constant(light(&parameters, "radiance")?, 1.0);
+                Some(map.map_err(|message| node.error(message))?)
             }
-            "envmap" => {
-                let map = self.environment_map(&parameters)?;
-                self.surround(node, map)?;
-                None
-            }
-            "sunsky" | "sky" | "sun" => {
-                let map = self.daylight(&parameters)?;
-                self.surround(node, map)?;
-                None
-            }
+            "envmap" => Some(self.environment_map(&parameters)?),
+            "sunsky" | "sky" | "sun" => Some(self.daylight(&parameters)?),
+            _ => None,
+        };
+        let kind = match node.kind() {
+            _ if map.is_some() => None,
             "point" => Some(point(&parameters)?),
             "spot" => Some(self.spot(&parameters)?),
             "directional" | "distant" => Some(directional(&parameters)?),
@@ -58,15 +52,9 @@ impl Reader {
             let name = node.attribute("id").unwrap_or_default().to_owned();
             self.lamps.push(Lamp { name, kind, light_group: None });
         }
-        Ok(())
-    }
-
-    /// Takes the environment, of which there is one.
-    fn surround(&mut self, node: Node<'_>, map: EnvironmentMap) -> Result<()> {
-        if self.environment.is_some() {
+        if map.is_some() && std::mem::replace(&mut self.environment, map).is_some() {
             return Err(node.error("expected at most one envmap or constant, found another"));
         }
-        self.environment = Some(map);
         Ok(())
     }
 

@@ -167,7 +167,7 @@ impl Reader {
         let transform = placement(node, matrix)?;
         let first_vertex = self.geometry.positions.len();
         let mesh = shape.turned(transform.mirrors);
-        let counts = self.geometry.counts_with(mesh.positions.len(), mesh.triangles.len());
+        let counts = self.geometry.counts(mesh.positions.len(), mesh.triangles.len());
         counts.map_err(|message| node.error(message))?;
         let dropped = self.geometry.append(&mesh, &transform, |_| shape.material);
         self.dropped.add(dropped, mesh.triangles.len(), || format!("shape of {}", node.place()));
