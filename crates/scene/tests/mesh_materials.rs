@@ -13,7 +13,7 @@ use glam::Vec3;
 
 use crate::support::{
     folder::{self, Folder},
-    gltf::{Attribute, base64, gltf, gltf_of, png},
+    gltf::{Attribute, base64, floats, gltf, gltf_of, png},
 };
 
 /// Positions of a triangle in the plane z = 0, and its texture coordinates, v downwards.
@@ -390,6 +390,69 @@ fn faces_back_to_back_look_their_own_way() {
     let height = |triangle: usize| mesh.positions[mesh.triangles[triangle][0] as usize][2];
     assert!(height(0) > 0.0 && height(1) < 0.0 && height(0) < 1e-4, "{:?}", mesh.positions);
     assert!(warnings.iter().any(|text| text.contains("1 pairs of triangles lie back to back")));
+}
+
+/// Steps by which triangles of different materials stand above z = 0, and warnings. The first two materials
+/// are opaque, the third lets half the light through, the fourth is glass.
+fn heights(triangles: &[[u8; 3]], is_culled: bool) -> (Vec<f32>, Vec<String>) {
+    let folder = Folder::new();
+    let corners = [5.0, 0.0, 0.0, 6.0, 0.0, 0.0, 5.0, 1.0, 0.0, 5.0, 0.0, -0.0];
+    let bytes = [floats(&corners), triangles.concat()].concat();
+    let all =
+        |of: &dyn Fn(usize) -> String| (0..triangles.len()).map(of).collect::<Vec<_>>().join(", ");
+    let primitives = all(&|at| {
+        format!(r#"{{"attributes": {{"POSITION": 0}}, "indices": {}, "material": {at}}}"#, at + 1)
+    });
+    let indices = all(&|at| {
+        let first = 3 * at;
+        format!(
+            r#"{{"bufferView": 1, "byteOffset": {first}, "componentType": 5121, "count": 3, "type": "SCALAR"}}"#
+        )
+    });
+    let materials = all(&|at| {
+        let (alpha, transmission) = (["1", "1", "0.5", "1"][at], u8::from(at == 3));
+        format!(
+            r#"{{"doubleSided": {}, "alphaMode": "BLEND", "pbrMetallicRoughness":
+            {{"baseColorFactor": [1, 1, 1, {alpha}], "metallicFactor": 0}}, "extensions":
+            {{"KHR_materials_transmission": {{"transmissionFactor": {transmission}}}}}}}"#,
+            !is_culled
+        )
+    });
+    let (count, length, inline) = (triangles.len() * 3, bytes.len(), base64(&bytes));
+    let text = format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],
+        "materials": [{materials}], "meshes": [{{"primitives": [{primitives}]}}],
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+            "min": [5, 0, 0], "max": [6, 1, 0]}}, {indices}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 48}},
+            {{"buffer": 0, "byteOffset": 48, "byteLength": {count}}}],
+        "buffers": [{{"byteLength": {length}, "uri": "data:;base64,{inline}"}}]}}"#
+    );
+    let mut warnings = Vec::new();
+    let mesh = Mesh::read(&folder.write("a.gltf", text), &mut warnings).unwrap();
+    mesh.check().unwrap();
+    let height = |triangle: &[u32; 3]| {
+        // A step is 1.2e-5 of the largest coordinate, rounded up to a power of two.
+        let [a, b, c] = triangle.map(|at| mesh.positions[at as usize][2] / (8.0 * 1.2e-5));
+        assert_eq!((a, b), (b, c));
+        a
+    };
+    (mesh.triangles.iter().map(height).collect(), warnings)
+}
+
+#[test]
+fn faces_back_to_back_part_and_layers_rise() {
+    let (front, back) = ([0, 1, 2], [2, 1, 3]);
+    assert_eq!(heights(&[front, back], true), (vec![1.0, -1.0], vec![]));
+    let (found, warnings) = heights(&[front, back], false);
+    assert_eq!(found, [1.0, -1.0]);
+    assert!(warnings[0].contains("1 pairs of triangles lie back to back"), "{warnings:?}");
+    let (found, warnings) = heights(&[front, [1, 2, 3]], true);
+    assert_eq!(found, [0.0, 0.0]);
+    assert!(warnings[0].contains("1 triangles lie on others"), "{warnings:?}");
+    assert_eq!(heights(&[front, back, front, back], true).0, [1.0, -1.0, 2.0, -2.0]);
+    // Another place, and no area.
+    assert_eq!(heights(&[front, [0, 3, 1]], false), (vec![0.0, 0.0], vec![]));
 }
 
 #[test]

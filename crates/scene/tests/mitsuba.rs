@@ -706,6 +706,153 @@ fn strands_of_files_are_tubes_in_the_world() {
     }
 }
 
+/// So many that half of them are kept, each twice as thick.
+#[test]
+fn many_strands_stay_within_a_bound() {
+    let count = 400_000_u32;
+    let mut bytes = [b"BINARY_HAIR", &(2 * count).to_le_bytes()[..]].concat();
+    let strand = [f32::INFINITY, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0].map(f32::to_le_bytes).concat();
+    bytes.extend(strand.repeat(count as usize));
+    let folder = Folder::new();
+    folder.write("a.hair", bytes);
+    let shape = r#"<shape type="hair"><string name="filename" value="a.hair"/>
+        <float name="radius" value="1"/></shape>"#;
+    let scene = loaded(&folder.write("a.xml", document(&format!("{SENSOR}{shape}"))));
+    assert!(scene.warnings[0].contains("one of 2 strands"), "{:?}", scene.warnings);
+    // Tubes of three sides, as wide on the mean as all strands.
+    let kept = scene.geometry.triangles.len() / 6;
+    assert!(kept <= (1 << 21) / 6, "{kept}");
+    let [_, y, z] = scene.geometry.positions[0];
+    let whole = kept as f32 * 3.0 * y.hypot(z) * (PI / 3.0).sin();
+    let expected = PI * count as f32;
+    assert!((whole / expected - 1.0).abs() < 0.01, "{whole} {expected}");
+}
+
+/// Reflectance at normal incidence, diffuse and specular together.
+fn reflected(kind: &MaterialKind) -> Vec3 {
+    match kind {
+        MaterialKind::Diffuse { reflectance } => *reflectance,
+        MaterialKind::Principled(own) => {
+            let coat = 0.04 * own.specular * own.specular_color;
+            let below = (1.0 - own.metallic) * (1.0 - coat.max_element());
+            own.base_color * below + coat.lerp(own.base_color, own.metallic)
+        }
+        _ => panic!("{kind:?}"),
+    }
+}
+
+#[test]
+fn mixtures_are_linear_in_reflectance() {
+    let folder = Folder::new();
+    let bytes = [255, 0, 0, 0, 255, 0];
+    image::save_buffer(folder.path().join("a.png"), &bytes, 2, 1, image::ColorType::Rgb8).unwrap();
+    let image = |name: &str, rest: &str| {
+        format!(
+            "<texture type=\"bitmap\" name=\"{name}\"><string name=\"filename\" value=\"a.png\"/>\
+             <boolean name=\"raw\" value=\"true\"/>{rest}</texture>"
+        )
+    };
+    let mixed = |first: &str, second: &str, weight: &str| {
+        let shape = format!(
+            "<shape type=\"rectangle\"><bsdf type=\"blendbsdf\">{weight}{first}{second}</bsdf></shape>"
+        );
+        let scene = loaded(&folder.write("a.xml", document(&format!("{SENSOR}{shape}"))));
+        (scene.materials[0].clone(), scene.warnings)
+    };
+    let quarter = "<float name=\"weight\" value=\"0.25\"/>";
+    let by_image = image("weight", "");
+    let [a, b] = [Vec3::new(0.8, 0.4, 0.2), Vec3::new(0.1, 0.3, 0.5)];
+    let rgb = |color: Vec3| format!("value=\"{} {} {}\"/>", color.x, color.y, color.z);
+    let plain = |color: Vec3| {
+        format!("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" {}</bsdf>", rgb(color))
+    };
+    let textured = |color: Vec3, rest: &str| {
+        format!(
+            "<bsdf type=\"diffuse\"><texture type=\"scale\" name=\"reflectance\">{}\
+             <rgb name=\"scale\" {}</texture></bsdf>",
+            image("", rest),
+            rgb(color)
+        )
+    };
+    let texels = [Vec3::X, Vec3::Y];
+    // Reflectance of both texels of a diffuse mixture.
+    let both = |(material, warnings): (Material, Vec<String>)| {
+        assert!(warnings.is_empty(), "{warnings:?}");
+        let MaterialKind::Diffuse { reflectance } = material.kind else { panic!() };
+        let values = material.surface.color.map_or(vec![[1.0; 4]; 2], |color| color.values());
+        [0, 1].map(|at| reflectance * Vec3::from_slice(&values[at][..3]))
+    };
+    for (own, other) in [(false, false), (true, false), (false, true), (true, true)] {
+        let of = |color: Vec3, is_image: bool| match is_image {
+            true => textured(color, ""),
+            false => plain(color),
+        };
+        let found = both(mixed(&of(a, own), &of(b, other), quarter));
+        for (texel, found) in texels.iter().zip(found) {
+            let first = if own { a * texel } else { a };
+            let second = if other { b * texel } else { b };
+            assert!(found.abs_diff_eq(first.lerp(second, 0.25), 1e-3), "{found}");
+        }
+    }
+    let found = both(mixed(&plain(a), &plain(b), &by_image));
+    for (luminance, found) in [0.2126, 0.7152].into_iter().zip(found) {
+        assert!(found.abs_diff_eq(a.lerp(b, luminance), 1e-3), "{found}");
+    }
+    // One image is not two where it lies in two ways.
+    let clamp = "<string name=\"wrap_mode\" value=\"clamp\"/>";
+    let (_, warnings) = mixed(&textured(a, clamp), &textured(b, ""), quarter);
+    assert!(warnings[0].contains("gloss of `blendbsdf`"), "{warnings:?}");
+
+    let metal = Vec3::new(0.9, 0.8, 0.7);
+    let mirror = format!(
+        "<bsdf type=\"conductor\"><string name=\"material\" value=\"none\"/>\
+         <rgb name=\"specular_reflectance\" {}</bsdf>",
+        rgb(metal)
+    );
+    let kind = mixed(&mirror, &plain(b), quarter).0.kind;
+    let expected = metal.lerp(b, 0.25);
+    assert!(reflected(&kind).abs_diff_eq(expected, 0.02), "{kind:?} and {expected}");
+    // The gloss is that of the one that has gloss, and either may have bumps.
+    let MaterialKind::Principled(Principled { roughness, .. }) = kind else { panic!() };
+    assert!((roughness - 1e-3_f32.sqrt()).abs() < 1e-3, "{roughness}");
+    let bumpy =
+        |inner: &str| format!("<bsdf type=\"normalmap\">{}{inner}</bsdf>", image("normalmap", ""));
+    for (first, second) in [(bumpy(&mirror), plain(b)), (mirror.clone(), bumpy(&plain(b)))] {
+        assert!(mixed(&first, &second, quarter).0.surface.normal.is_some());
+    }
+    // Neither loses light, nor its other side.
+    let shiny = "<bsdf type=\"plastic\"><rgb name=\"diffuse_reflectance\" value=\"1\"/></bsdf>";
+    let once = format!("<bsdf type=\"blendbsdf\">{quarter}{shiny}{}</bsdf>", plain(Vec3::ONE));
+    let (white, _) = mixed(&once, shiny, quarter);
+    assert!(reflected(&white.kind).abs_diff_eq(Vec3::ONE, 0.02), "{white:?}");
+    assert!(!white.surface.two_sided);
+    let two_sided = format!("<bsdf type=\"twosided\">{mirror}</bsdf>");
+    assert!(mixed(&two_sided, &plain(b), quarter).0.surface.two_sided);
+    // One of two metals is a metal.
+    let MaterialKind::Principled(Principled { metallic, .. }) =
+        mixed(&mirror, &mirror, quarter).0.kind
+    else {
+        panic!()
+    };
+    assert!((metallic - 1.0).abs() < 1e-4, "{metallic}");
+    // By an image, whose texels have the luminances of red and green.
+    let (Material { kind, surface, .. }, _) = mixed(&mirror, &plain(b), &by_image);
+    let MaterialKind::Principled(kind) = kind else { panic!() };
+    let [color, metal_share] = [surface.color, surface.metallic].map(|used| used.unwrap().values());
+    for (index, luminance) in [0.2126, 0.7152].into_iter().enumerate() {
+        let kind = MaterialKind::Principled(Principled {
+            base_color: kind.base_color * Vec3::from_slice(&color[index][..3]),
+            metallic: kind.metallic * metal_share[index][0],
+            ..kind
+        });
+        let expected = metal.lerp(b, luminance);
+        assert!(reflected(&kind).abs_diff_eq(expected, 0.02), "{kind:?} and {expected}");
+    }
+    let (glass, warnings) = mixed("<bsdf type=\"thindielectric\"/>", &plain(b), quarter);
+    assert!(matches!(glass.kind, MaterialKind::ThinDielectric { .. }), "{glass:?}");
+    assert!(warnings[0].contains("the lesser part of `blendbsdf`"), "{warnings:?}");
+}
+
 /// Normal of the winding of the first triangle.
 fn winding(scene: &Scene) -> Vec3 {
     let [a, b, c] = scene.geometry.triangles[0]

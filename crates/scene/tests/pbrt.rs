@@ -883,7 +883,65 @@ fn curves_are_tubes_of_their_widths() {
         assert!((first[2] / 0.4 - 1.047).abs() < 1e-3, "{first:?}");
         assert!((last[2] / 0.2 - 1.047).abs() < 1e-3, "{last:?}");
     }
-    assert!(message("Shape \"curve\" \"point3 P\" [0 0 0 1 1 1]").contains("2 control points"));
+    for (basis, points) in [("bezier", 2), ("bezier", 6), ("bspline", 3)] {
+        let points = (points, "0 1 2 ".repeat(points));
+        let text = format!("\"string basis\" \"{basis}\" \"point3 P\" [{}]", points.1);
+        let expected = format!("{} control points make no curve", points.0);
+        assert!(message(&format!("Shape \"curve\" {text}")).contains(&expected));
+    }
+}
+
+/// Control points on a line: blending of whichever kind keeps it, and radii that grow along it.
+#[test]
+fn a_straight_curve_is_a_cone_of_the_right_width() {
+    let curve = |basis: &str, degree: usize, points: &str, widths: [f32; 2]| {
+        let [from, to] = widths;
+        let text = format!(
+            "Shape \"curve\" \"string basis\" \"{basis}\" \"integer degree\" {degree} \
+             \"point3 P\" [{points}] \"float width0\" {from} \"float width1\" {to}"
+        );
+        world(&text).geometry
+    };
+    for (basis, degree, points) in
+        [("bezier", 2, 5), ("bezier", 3, 7), ("bspline", 2, 6), ("bspline", 3, 6)]
+    {
+        let (first, last) = match (basis, degree) {
+            ("bspline", 2) => (0.5, 4.5),
+            ("bspline", _) => (1.0, 4.0),
+            _ => (0.0, (points - 1) as f32),
+        };
+        let controls: String = (0..points).map(|x| format!("1 {x} -2 ")).collect();
+        let mesh = curve(basis, degree, &controls, [first, last].map(|x| 0.02 * (1.0 + x)));
+        let ends = [mesh.positions[0][1], mesh.positions[mesh.positions.len() - 1][1]];
+        assert!((ends[0] - first).abs() < 1e-5, "{basis} {degree} {ends:?}");
+        assert!((ends[1] - last).abs() < 1e-5, "{basis} {degree} {ends:?}");
+        let along: Vec<f32> = mesh.uvs[0].iter().map(|uv| uv[0]).collect();
+        assert_eq!([along[0], along[along.len() - 1]], [0.0, 1.0], "{basis} {degree}");
+        let mut area = 0.0;
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|at| Vec3::from(mesh.positions[at as usize]));
+            let normal = (b - a).cross(c - a);
+            area += 0.5 * normal.length();
+            let middle = (a + b + c) / 3.0 - Vec3::new(1.0, 0.0, -2.0);
+            assert!(normal.dot(middle.with_y(0.0)) > 0.0, "{basis} {degree}: inside out");
+        }
+        // The cone's side, whose projections have its mean width.
+        let mean_radius = 0.01 * (1.0 + 0.5 * (first + last));
+        let expected = std::f32::consts::TAU * mean_radius * (last - first);
+        assert!((area / expected - 1.0).abs() < 1e-3, "{basis} {degree} {area} {expected}");
+    }
+    // A span of four points, whose weights are the coordinates over 8, in eight pieces of six sides.
+    for (basis, degree, ring, expected) in [
+        ("bezier", 3, 0, [0.0, 0.0, 0.0]),
+        ("bezier", 3, 4, [3.0, 3.0, 1.0]),
+        ("bspline", 3, 0, [32.0 / 6.0, 8.0 / 6.0, 0.0]),
+        ("bspline", 2, 12, [1.0, 6.0, 1.0]),
+    ] {
+        let mesh = curve(basis, degree, "0 0 0 8 0 0 0 8 0 0 0 8", [0.1; 2]);
+        let corners = mesh.positions[6 * ring..][..6].iter().map(|at| Vec3::from(*at));
+        let middle = corners.sum::<Vec3>() / 6.0;
+        assert!(middle.abs_diff_eq(expected.into(), 1e-4), "{basis} {degree}: {middle}");
+    }
 }
 
 #[test]
