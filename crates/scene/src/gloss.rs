@@ -34,22 +34,3 @@ fn metallic(diffuse: f32, specular: f32, share_below: f32) -> f32 {
 fn brightness(color: Vec3) -> f32 {
     (color * color).dot(Vec3::new(0.299, 0.587, 0.114)).sqrt()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A grey material keeps its diffuse reflectance and its reflectance at normal incidence.
-    #[test]
-    fn greys_keep_both_reflectances() {
-        for (diffuse, specular) in [(0.5, 0.04), (0.3, 0.2), (0.8, 0.5), (0.0, 0.9), (0.2, 0.06)] {
-            let (base, metallic) = metallic_roughness(Vec3::splat(diffuse), Vec3::splat(specular));
-            let below = base.x * (1.0 - metallic) * (1.0 - DIELECTRIC);
-            let normal = DIELECTRIC + (base.x - DIELECTRIC) * metallic;
-            let expected = diffuse * (1.0 - specular);
-            assert!((below - expected).abs() < 0.02, "{diffuse} {specular}: {below}");
-            assert!((normal - specular).abs() < 0.02, "{diffuse} {specular}: {normal}");
-        }
-        assert_eq!(metallic_roughness(Vec3::ONE, Vec3::ZERO).1, 0.0);
-    }
-}

@@ -338,6 +338,37 @@ fn specular_glossiness_is_converted_texel_by_texel() {
     assert!(metallic[1][0] > 0.99 && (color[1][0] - 0.5 * 0.791).abs() < 0.01, "{color:?}");
 }
 
+/// A grey material keeps its diffuse reflectance and its reflectance at normal incidence.
+#[test]
+fn greys_keep_both_reflectances() {
+    let folder = Folder::new();
+    folder.write("a.png", png([[255; 4]; 2]));
+    let rest = r#", "images": [{"uri": "a.png"}], "textures": [{"source": 0}]"#;
+    // One without a gloss stays what it is.
+    for (diffuse, specular) in
+        [(0.5, 0.04), (0.3, 0.2), (0.8, 0.5), (0.0, 0.9), (0.2, 0.06), (1.0, 0.0)]
+    {
+        let material = format!(
+            r#"{{"extensions": {{"KHR_materials_pbrSpecularGlossiness": {{
+            "diffuseFactor": [{diffuse}, {diffuse}, {diffuse}, 1],
+            "specularFactor": [{specular}, {specular}, {specular}],
+            "specularGlossinessTexture": {{"index": 0}}}}}}}}"#
+        );
+        let surface = gltf_material(&folder, &material, rest).0.surface;
+        let [base, metallic] =
+            [surface.color, surface.metallic].map(|used| used.unwrap().values()[0][0]);
+        if specular == 0.0 {
+            assert_eq!(metallic, 0.0);
+            continue;
+        }
+        let below = base * (1.0 - metallic) * 0.96;
+        let normal = 0.04 + (base - 0.04) * metallic;
+        let expected = diffuse * (1.0 - specular);
+        assert!((below - expected).abs() < 0.02, "{diffuse} {specular}: {below}");
+        assert!((normal - specular).abs() < 0.02, "{diffuse} {specular}: {normal}");
+    }
+}
+
 #[test]
 fn transmission_by_texture_is_glass_where_it_says_so() {
     let folder = Folder::new();
@@ -406,7 +437,8 @@ fn heights(triangles: &[[u8; 3]], is_culled: bool) -> (Vec<f32>, Vec<String>) {
     let indices = all(&|at| {
         let first = 3 * at;
         format!(
-            r#"{{"bufferView": 1, "byteOffset": {first}, "componentType": 5121, "count": 3, "type": "SCALAR"}}"#
+            r#"{{"bufferView": 1, "byteOffset": {first}, "componentType": 5121, "count": 3,
+            "type": "SCALAR"}}"#
         )
     });
     let materials = all(&|at| {

@@ -64,8 +64,8 @@ impl EnvironmentMap {
     /// # Errors
     /// Returns a message if the product is negative, infinite (above [`MAX_RADIANCE`]) or NaN.
     pub fn constant(radiance: Vec3, scale: f32) -> Result<Self, String> {
-        let texel = radiance * scale;
-        if !texel.to_array().iter().all(|value| (0.0..=MAX_RADIANCE).contains(value)) {
+        let scaled = (radiance * scale).to_array();
+        if !scaled.iter().all(|value| (0.0..=MAX_RADIANCE).contains(value)) {
             return Err(format!(
                 "constant = {radiance} with scale = {scale}; expected numbers from 0 to \
                  {MAX_RADIANCE:e}"
@@ -73,14 +73,7 @@ impl EnvironmentMap {
         }
         // Use rows so low that the sampling density, which follows sin θ only from row to row, is
         // nearly uniform.
-        let (width, height) = (64, 32);
-        Ok(Self {
-            width,
-            height,
-            texels: vec![texel; (width * height) as usize],
-            rotation_rad: 0.0,
-            source: "constant".into(),
-        })
+        Ok(Self::procedural("constant", 64, vec![radiance; 64 * 32], scale))
     }
 
     /// The same map with another rotation about +Y, degrees, counter-clockwise seen from above.

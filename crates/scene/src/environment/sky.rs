@@ -75,14 +75,8 @@ impl EnvironmentMap {
         let sun =
             Vec3::new(cos_elevation * sin_azimuth, sin_elevation, -cos_elevation * cos_azimuth);
         let mut texels = render(width, 1, |direction| sky_radiance(parameters, sun, direction));
-
-        add_disc(
-            &mut texels,
-            width,
-            sun,
-            sun_radius_deg.to_radians(),
-            parameters.sun_radiance.into(),
-        );
+        let radius = sun_radius_deg.to_radians();
+        add_disc(&mut texels, width, sun, radius, parameters.sun_radiance.into());
         Ok(Self::procedural("sky", width, texels, scale))
     }
 }

@@ -1,6 +1,6 @@
 //! Lamps and the environment.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::models::{indented, property, rgb};
 use crate::{
@@ -32,15 +32,11 @@ pub(super) fn lamp(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
                     lamp.name
                 ));
             }
-            let target = spot.position.as_dvec3() + spot.direction.as_dvec3();
+            let DVec3 { x, y, z } = spot.position.as_dvec3() + spot.direction.as_dvec3();
+            let [origin, up] = [spot.position, spot.direction.any_orthonormal_vector()].map(triple);
             let place = format!(
-                "    <transform name=\"to_world\">\n        <lookat origin=\"{}\" target=\"{}, {}, {}\" \
-                 up=\"{}\"/>\n    </transform>\n",
-                triple(spot.position),
-                target.x,
-                target.y,
-                target.z,
-                triple(spot.direction.any_orthonormal_vector()),
+                "    <transform name=\"to_world\">\n        <lookat origin=\"{origin}\" \
+                 target=\"{x}, {y}, {z}\" up=\"{up}\"/>\n    </transform>\n"
             );
             let angles = [
                 property("float", "cutoff_angle", spot.outer_angle_rad.to_degrees()),

@@ -32,7 +32,7 @@ use super::{
     subject::Subject,
     triple,
 };
-use crate::{Camera, Filter, Scene, files};
+use crate::{Camera, FilmSettings, Filter, Scene, files};
 
 /// Distance of a mesh that emits backwards from the one that emits forwards, as a part of the size of
 /// the scene.
@@ -119,36 +119,32 @@ fn sensor(scene: &Scene, parts: &[Parts], samples: u32) -> String {
     number("near_clip", 1e-6 * far);
     // The plane of focus lies between the clip planes.
     number("far_clip", if aperture_radius > 0.0 { far.max(2.0 * focus_distance) } else { far });
-    let filter = match scene.film.filter {
+    let FilmSettings { width, height, filter } = scene.film;
+    let filter = match filter {
         Filter::Box => "<rfilter type=\"box\"/>",
         Filter::Gaussian => {
             "<rfilter type=\"gaussian\"><float name=\"stddev\" value=\"0.5\"/></rfilter>"
         }
     };
+    let [origin, target, up] = [position, look_at, up].map(triple);
     _ = write!(
         xml,
         r#"        <string name="fov_axis" value="y"/>
         <transform name="to_world">
-            <lookat origin="{}" target="{}" up="{}"/>
+            <lookat origin="{origin}" target="{target}" up="{up}"/>
         </transform>
         <sampler type="independent">
-            <integer name="sample_count" value="{}"/>
+            <integer name="sample_count" value="{samples}"/>
         </sampler>
         <film type="hdrfilm">
-            <integer name="width" value="{}"/>
-            <integer name="height" value="{}"/>
+            <integer name="width" value="{width}"/>
+            <integer name="height" value="{height}"/>
             <string name="pixel_format" value="rgb"/>
             <string name="component_format" value="float32"/>
             {filter}
         </film>
     </sensor>
-"#,
-        triple(position),
-        triple(look_at),
-        triple(up),
-        samples,
-        scene.film.width,
-        scene.film.height,
+"#
     );
     xml
 }

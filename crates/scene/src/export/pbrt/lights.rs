@@ -1,6 +1,6 @@
 //! Lamps and the environment.
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::triple;
@@ -38,17 +38,14 @@ pub(super) fn lamp(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
                     lamp.name
                 ));
             }
-            let target = spot.position.as_dvec3() + spot.direction.as_dvec3();
+            let DVec3 { x, y, z } = spot.position.as_dvec3() + spot.direction.as_dvec3();
             let [inner, outer] = [spot.inner_angle_rad, spot.outer_angle_rad]
                 .map(|angle| f64::from(angle).to_degrees());
             format!(
                 "LightSource \"spot\" \"rgb I\" [{}] \"point3 from\" [{}]\n    \
-                 \"point3 to\" [{} {} {}] \"float coneangle\" {outer} \"float conedeltaangle\" {}\n",
+                 \"point3 to\" [{x} {y} {z}] \"float coneangle\" {outer} \"float conedeltaangle\" {}\n",
                 triple(spot.intensity),
                 triple(spot.position),
-                target.x,
-                target.y,
-                target.z,
                 outer - inner
             )
         }

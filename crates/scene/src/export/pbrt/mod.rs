@@ -27,7 +27,7 @@ use super::{
     left_out, parts,
     subject::Subject,
 };
-use crate::{Camera, Filter, Scene, files};
+use crate::{Camera, FilmSettings, Filter, Scene, files};
 
 /// Translates the materials and lamps for a scene file at `path`, without writing anything.
 pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'a> {
@@ -90,15 +90,13 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
 fn view(scene: &Scene, settings: Settings, name: &str) -> String {
     let Camera { position, look_at, up, .. } = scene.camera;
     let Camera { vertical_fov_deg, aperture_radius, focus_distance, .. } = scene.camera;
-    let film = scene.film;
-    let aspect = f64::from(film.width) / f64::from(film.height);
+    let FilmSettings { width, height, filter } = scene.film;
+    let aspect = f64::from(width) / f64::from(height);
     let tangent = (0.5 * f64::from(vertical_fov_deg)).to_radians().tan();
     let fov = 2.0 * (tangent * aspect.min(1.0)).atan().to_degrees();
+    let [eye, target, up] = [position, look_at, up].map(triple);
     let mut text = format!(
-        "Scale -1 1 1\nLookAt {}\n       {}\n       {}\nCamera \"perspective\" \"float fov\" {fov}",
-        triple(position),
-        triple(look_at),
-        triple(up)
+        "Scale -1 1 1\nLookAt {eye}\n       {target}\n       {up}\nCamera \"perspective\" \"float fov\" {fov}"
     );
     if aperture_radius > 0.0 {
         _ = write!(
@@ -106,23 +104,22 @@ fn view(scene: &Scene, settings: Settings, name: &str) -> String {
             " \"float lensradius\" {aperture_radius} \"float focaldistance\" {focus_distance}"
         );
     }
+    let filter = match filter {
+        Filter::Box => r#""box" "float xradius" 0.5 "float yradius" 0.5"#,
+        Filter::Gaussian => {
+            r#""gaussian" "float xradius" 1.5 "float yradius" 1.5 "float sigma" 0.5"#
+        }
+    };
+    let integrator = if has_media(scene) { "volpath" } else { "path" };
+    let Settings { samples, depth } = settings;
     text + &format!(
-        "\nFilm \"rgb\" \"integer xresolution\" {} \"integer yresolution\" {}\n    \
-         \"string sensor\" \"cie1931\" \"string filename\" \"{}.exr\"\nPixelFilter {}\n\
-         Sampler \"independent\" \"integer pixelsamples\" {}\n\
-         Integrator \"{}\" \"integer maxdepth\" {}\n",
-        film.width,
-        film.height,
-        name,
-        match film.filter {
-            Filter::Box => "\"box\" \"float xradius\" 0.5 \"float yradius\" 0.5",
-            Filter::Gaussian => {
-                "\"gaussian\" \"float xradius\" 1.5 \"float yradius\" 1.5 \"float sigma\" 0.5"
-            }
-        },
-        settings.samples,
-        if has_media(scene) { "volpath" } else { "path" },
-        settings.depth,
+        r#"
+Film "rgb" "integer xresolution" {width} "integer yresolution" {height}
+    "string sensor" "cie1931" "string filename" "{name}.exr"
+PixelFilter {filter}
+Sampler "independent" "integer pixelsamples" {samples}
+Integrator "{integrator}" "integer maxdepth" {depth}
+"#
     )
 }
 

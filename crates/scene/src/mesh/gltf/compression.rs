@@ -26,6 +26,7 @@ use meshopt_rs::{
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
+use super::index;
 use crate::{
     error::{Error, Result},
     memory,
@@ -84,8 +85,7 @@ fn part<T: DeserializeOwned>(json: Value) -> Result<T, String> {
 
 /// A number that must be there.
 fn count(json: &Value, key: &str) -> Result<usize, String> {
-    let number = json[key].as_u64().and_then(|number| usize::try_from(number).ok());
-    number.ok_or_else(|| format!("expected a number `{key}`, found {}", json[key]))
+    index(&json[key]).ok_or_else(|| format!("expected a number `{key}`, found {}", json[key]))
 }
 
 /// Bytes from `offset` of a buffer.

@@ -8,7 +8,7 @@ use gltf::{
 };
 use serde_json::Value;
 
-use super::GltfReader;
+use super::{GltfReader, index};
 use crate::{
     error::Result,
     features::{self, Ignored},
@@ -126,16 +126,17 @@ impl GltfReader<'_> {
         if instancing.is_null() {
             return Ok(vec![world_from_node]);
         }
+        let error = |message: String| {
+            let node = label("node", node.index(), node.name());
+            self.error(format!("{node}: {message}"))
+        };
         let accessor = |name: &str| match &instancing["attributes"][name] {
             Value::Null => Ok(None),
-            index => index
-                .as_u64()
-                .and_then(|index| self.document.accessors().nth(usize::try_from(index).ok()?))
-                .map(Some)
-                .ok_or_else(|| {
-                    let node = label("node", node.index(), node.name());
-                    self.error(format!("{node}: EXT_mesh_gpu_instancing has no accessor {index}"))
-                }),
+            found => {
+                let accessor = index(found).and_then(|at| self.document.accessors().nth(at));
+                let message = || format!("EXT_mesh_gpu_instancing has no accessor {found}");
+                accessor.map(Some).ok_or_else(|| error(message()))
+            }
         };
         let vectors = |name| accessor(name)?.map(|found| self.vectors::<3>(&found)).transpose();
         let (shifts, scales) = (vectors("TRANSLATION")?, vectors("SCALE")?);
@@ -147,10 +148,8 @@ impl GltfReader<'_> {
         ];
         let count = lengths.into_iter().flatten().max().unwrap_or(1);
         if lengths.into_iter().flatten().any(|length| length != count) {
-            let node = label("node", node.index(), node.name());
-            return Err(self.error(format!(
-                "{node}: the attributes of EXT_mesh_gpu_instancing differ in length"
-            )));
+            let message = "the attributes of EXT_mesh_gpu_instancing differ in length";
+            return Err(error(message.to_owned()));
         }
         let instance = |index: usize| {
             let shift = shifts.as_ref().map_or(Vec3::ZERO, |shifts| shifts[index].into());

@@ -8,7 +8,7 @@ use glam::{Mat4, Vec3};
 use gltf::Node;
 
 use super::{
-    GltfReader,
+    GltfReader, index,
     material::{number, vector},
 };
 use crate::{
@@ -22,15 +22,15 @@ impl GltfReader<'_> {
     /// Adds the light of a node, which shines along −Z.
     pub(super) fn read_lamp(&mut self, node: &Node, world_from_node: Mat4) -> Result<()> {
         let json = self.json;
-        let index = &json["nodes"][node.index()]["extensions"]["KHR_lights_punctual"]["light"];
-        if index.is_null() {
+        let found = &json["nodes"][node.index()]["extensions"]["KHR_lights_punctual"]["light"];
+        if found.is_null() {
             return Ok(());
         }
         let place = || label("node", node.index(), node.name());
         let lights = &json["extensions"]["KHR_lights_punctual"]["lights"];
-        let light = index.as_u64().and_then(|index| lights.get(usize::try_from(index).ok()?));
+        let light = index(found).and_then(|at| lights.get(at));
         let error = |message: String| self.error(format!("{}: {message}", place()));
-        let light = light.ok_or_else(|| error(format!("the file has no light {index}")))?;
+        let light = light.ok_or_else(|| error(format!("the file has no light {found}")))?;
         let color = Vec3::from_array(vector(light, "color", [1.0; 3]));
         let intensity = color * number(light, "intensity", 1.0);
         if !intensity.is_finite() || intensity.min_element() < 0.0 {

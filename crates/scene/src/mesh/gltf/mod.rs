@@ -110,6 +110,11 @@ pub fn read(
     Ok(mesh)
 }
 
+/// Number of a part of the document; none for other values.
+fn index(json: &Value) -> Option<usize> {
+    json.as_u64().and_then(|number| usize::try_from(number).ok())
+}
+
 struct GltfReader<'a> {
     path: &'a Path,
     document: &'a Document,

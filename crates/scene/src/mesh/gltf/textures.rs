@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::{
-    GltfReader, document,
+    GltfReader, document, index,
     material::{Reading, number, vector},
 };
 use crate::{
@@ -31,14 +31,12 @@ impl GltfReader<'_> {
             return Ok(None);
         }
         let json = self.json;
-        let number_of = |value: &Value| value.as_u64().and_then(|n| usize::try_from(n).ok());
-        let Some(texture) = number_of(&info["index"]).and_then(|index| json["textures"].get(index))
-        else {
-            let (place, index) = (&reading.place, &info["index"]);
-            return Err(self.error(format!("{place}: the file has no texture {index}")));
+        let Some(texture) = index(&info["index"]).and_then(|at| json["textures"].get(at)) else {
+            let (place, found) = (&reading.place, &info["index"]);
+            return Err(self.error(format!("{place}: the file has no texture {found}")));
         };
         let webp = &texture["extensions"]["EXT_texture_webp"];
-        let Some(source) = number_of(&texture["source"]).or(number_of(&webp["source"])) else {
+        let Some(source) = index(&texture["source"]).or(index(&webp["source"])) else {
             let extensions = texture["extensions"].as_object().into_iter().flatten();
             // Without its image a surface would look like another one.
             if let Some((name, _)) = extensions.into_iter().find(|(_, own)| own["source"].is_u64())
@@ -67,7 +65,7 @@ impl GltfReader<'_> {
             }
         };
         let Some(image) = self.image(source, &reading.place)? else { return Ok(None) };
-        let sampler = number_of(&texture["sampler"]).and_then(|at| json["samplers"].get(at));
+        let sampler = index(&texture["sampler"]).and_then(|at| json["samplers"].get(at));
         let sampler = sampler.unwrap_or(&Value::Null);
         let wrap = |key: &str| match sampler[key].as_u64() {
             Some(CLAMP_TO_EDGE) => Wrap::Clamp,
@@ -106,7 +104,7 @@ impl GltfReader<'_> {
                 },
             }
         } else {
-            let view = image["bufferView"].as_u64().and_then(|at| usize::try_from(at).ok());
+            let view = super::index(&image["bufferView"]);
             let view = view.and_then(|at| self.document.views().nth(at)).ok_or_else(|| {
                 self.error(format!("image {index}: expected a URI or a buffer view, found neither"))
             })?;
