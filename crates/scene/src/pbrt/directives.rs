@@ -8,7 +8,7 @@ use super::{
     log::Log,
     parameters::{Entity, Parameter, read_parameters},
     source::{Part, Source},
-    state::{MaterialChoice, Saved, States, look_at},
+    state::{MaterialChoice, Saved, State, States, look_at},
     tokens::{Place, Token},
 };
 use crate::{
@@ -21,14 +21,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct Shape {
     pub entity: Entity,
-    /// World, or object of instances, from shape.
-    pub world_from_shape: DMat4,
-    /// True if the outside is the inside.
-    pub reverse: bool,
-    pub material: MaterialChoice,
-    /// `AreaLightSource`, if the shape emits.
-    pub light: Option<Rc<Entity>>,
-    pub interior: Option<String>,
+    /// Its matrix is world, or object of instances, from shape.
+    pub state: State,
 }
 
 /// Use of an object.
@@ -379,14 +373,7 @@ impl<'a> Reader<'a> {
                 self.states.now.material = MaterialChoice::Named(Rc::from(kind), place);
             }
             "Shape" => {
-                let shape = Shape {
-                    entity: read("Shape", "shape", kind, place)?,
-                    world_from_shape: now.ctm,
-                    reverse: now.reverse,
-                    material: now.material,
-                    light: now.area_light,
-                    interior: now.interior,
-                };
+                let shape = Shape { entity: read("Shape", "shape", kind, place)?, state: now };
                 match self.object {
                     Some(index) => self.description.objects[index].shapes.push(shape),
                     None => self.description.shapes.push(shape),

@@ -190,13 +190,13 @@ impl Builder<'_> {
     fn prepare(&mut self, shape: &Shape, in_object: bool) -> Result<Option<(Mesh, u32)>> {
         let Textures { folder, log, .. } = &mut self.materials.textures;
         let mut mesh = shapes::mesh(&shape.entity, folder, &mut self.strands, log)?;
-        let light = match &shape.light {
+        let light = match &shape.state.area_light {
             Some(entity) if in_object => {
                 self.materials.textures.log.ignore(features::PBRT_INSTANCE_LIGHT, &entity.place);
                 None
             }
             Some(entity) => {
-                let area = area(&mesh, self.view.mirror * shape.world_from_shape);
+                let area = area(&mesh, self.view.mirror * shape.state.ctm);
                 let exposure = self.view.exposure;
                 let textures = &mut self.materials.textures;
                 Some(lights::area_light(entity, area, exposure, textures)?)
@@ -211,18 +211,18 @@ impl Builder<'_> {
             let error = |message: String| shape.entity.error(message);
             shapes::give_coordinates(&mut mesh).map_err(error)?;
         }
-        if shape.reverse {
+        if shape.state.reverse {
             mesh.reverse();
         }
         let reliefs = &self.materials.reliefs;
         if surface.normal.as_ref().is_some_and(|normal| !reliefs.hold(normal)) {
-            shapes::give_tangents(&mut mesh, shape.world_from_shape.determinant() < 0.0);
+            shapes::give_tangents(&mut mesh, shape.state.ctm.determinant() < 0.0);
         }
         Ok(Some((mesh, material)))
     }
 
     fn material(&mut self, shape: &Shape, light: Option<Emission>) -> Result<Option<u32>> {
-        let choice = match &shape.material {
+        let choice = match &shape.state.material {
             MaterialChoice::Default => String::new(),
             MaterialChoice::Own(entity) => format!("{:p}", Rc::as_ptr(entity)),
             MaterialChoice::Named(name, _) => format!("named {name}"),
@@ -233,12 +233,12 @@ impl Builder<'_> {
             let image = light.texture.as_ref().map_or("", |image| &image.texture.name);
             (light.radiance.to_array().map(f32::to_bits), light.two_sided, image.to_owned())
         });
-        let key = (choice, alpha_key, shape.interior.clone(), light_key);
+        let key = (choice, alpha_key, shape.state.interior.clone(), light_key);
         let kept = match self.made_by_key.get(&key) {
             Some(kept) => *kept,
             None => {
-                let mut made = self.materials.make(&shape.material)?;
-                if let Some(medium) = &shape.interior {
+                let mut made = self.materials.make(&shape.state.material)?;
+                if let Some(medium) = &shape.state.interior {
                     let kind = made.as_mut().map(|made| &mut made.kind);
                     self.materials.fill(kind, medium, &shape.entity.place)?;
                 }
@@ -255,7 +255,7 @@ impl Builder<'_> {
                 kept
             }
         };
-        if let (None, Some(entity)) = (kept, &shape.light) {
+        if let (None, Some(entity)) = (kept, &shape.state.area_light) {
             self.materials.textures.log.ignore(features::PBRT_INTERFACE_LIGHT, &entity.place);
         }
         Ok(kept)
@@ -286,7 +286,7 @@ impl Builder<'_> {
         let instances: Vec<_> = places
             .iter()
             .map(|place| {
-                let placed = self.view.mirror * *place * shape.world_from_shape;
+                let placed = self.view.mirror * *place * shape.state.ctm;
                 let transform = Transform::from_matrix(placed)?;
                 Instance::new(index, &transform, material, true)
             })
@@ -320,7 +320,7 @@ impl Builder<'_> {
     }
 
     fn place(&mut self, mesh: &Mesh, material: u32, shape: &Shape, outer: DMat4) -> Result<()> {
-        let placed = self.view.mirror * outer * shape.world_from_shape;
+        let placed = self.view.mirror * outer * shape.state.ctm;
         let Some(transform) = Transform::from_matrix(placed) else {
             self.materials.textures.log.ignore(features::PBRT_FLAT, &shape.entity.place);
             return Ok(());
