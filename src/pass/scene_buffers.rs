@@ -77,7 +77,7 @@ impl SceneBuffers {
             surface.emission_density = *density;
         }
         for (surface, material) in surface_tables.surfaces.iter_mut().zip(&scene.materials) {
-            surface.light_group = light_groups.of_surface(&material.surface);
+            surface.light_group = light_groups.index(material.surface.light_group.as_deref());
         }
         let attributes = TriangleAttributes::new(&scene.geometry, built, surface_tables.attributes);
         let textures = TextureBuffers::new(device, &surface_tables, &attributes)?;

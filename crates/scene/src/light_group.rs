@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::{Scene, material::Surface};
+use crate::Scene;
 
 /// Group of the environment.
 pub const ENVIRONMENT: &str = "environment";
@@ -37,10 +37,5 @@ impl LightGroups {
     pub fn index(&self, light_group: Option<&str>) -> u32 {
         let name = light_group.unwrap_or(LAMPS);
         self.names.iter().position(|known| known == name).unwrap_or(0) as u32
-    }
-
-    /// Place of the group of the light that a surface emits.
-    pub fn of_surface(&self, surface: &Surface) -> u32 {
-        self.index(surface.light_group.as_deref())
     }
 }

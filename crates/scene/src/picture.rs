@@ -355,12 +355,9 @@ impl Image {
         let display = image.attributes.display_window.size;
         let position = layer.attributes.layer_position;
         let mut result = Self {
-            width: dimension(layer.size.width())?,
-            height: dimension(layer.size.height())?,
             origin: [position.x(), position.y()],
             film_size: [dimension(display.width())?, dimension(display.height())?],
-            channels: BTreeMap::new(),
-            attributes: BTreeMap::new(),
+            ..Self::new(dimension(layer.size.width())?, dimension(layer.size.height())?)
         };
         for channel in layer.channel_data.list {
             let name = string(&channel.name);

@@ -23,7 +23,7 @@ use crate::{
 const MAX_GROUPS: usize = 4;
 
 /// Shape as it stands in its group or in the scene.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Shape {
     mesh: Mesh,
     to_world: DMat4,
@@ -179,14 +179,7 @@ impl Reader {
         let parameters = Parameters::new(node);
         let to_world = parameters.transform("to_world")?;
         let flips = parameters.boolean("flip_normals")?.unwrap_or(false);
-        let mut shape = Shape {
-            mesh: Mesh::default(),
-            to_world,
-            material: 0,
-            flips,
-            flips_mirrored: false,
-            is_file: false,
-        };
+        let mut shape = Shape { to_world, flips, ..Shape::default() };
         let radius = || Ok(parameters.float_in("radius", (1e-9, 1e9))?.unwrap_or(1.0));
         match node.kind() {
             "obj" | "ply" | "serialized" => self.mesh_file(&parameters, &mut shape)?,
