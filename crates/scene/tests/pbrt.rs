@@ -758,6 +758,43 @@ fn square_maps_keep_directions_and_power() {
     assert!(pairs.all(|(one, other)| one.abs_diff_eq(*other, 1e-4)));
 }
 
+/// A sheet of 8 × 2 units, placed or as instances, under an image that lies on it twice along x. Heights rise
+/// by 0.01 a texel along x and by 0.03 along y, from the lower edge to the upper.
+#[test]
+fn heights_become_normals_by_the_size_of_their_image() {
+    let folder = Folder::new();
+    let bytes: Vec<u8> = (0..16 * 8).map(|at| at % 16 + 3 * (8 - at / 16)).collect();
+    image::save_buffer(folder.path().join("a.png"), &bytes, 16, 8, image::ColorType::L8).unwrap();
+    let mut ply = "ply\nformat ascii 1.0\nelement vertex 81\nproperty float x\nproperty float y\n\
+        property float z\nproperty float u\nproperty float v\nelement face 64\n\
+        property list uchar int vertex_indices\nend_header\n"
+        .to_owned();
+    for (u, v) in (0..81).map(|at| ((at % 9) as f32 / 8.0, (at / 9) as f32 / 8.0)) {
+        ply += &format!("{} {} 0 {u} {v}\n", 8.0 * u, 2.0 * v);
+    }
+    for at in (0..72).filter(|at| at % 9 < 8) {
+        ply += &format!("4 {at} {} {} {}\n", at + 1, at + 10, at + 9);
+    }
+    folder.write("a.ply", ply);
+    for uses in [1, 10_000] {
+        let text = format!(
+            r#"{MIRRORED} WorldBegin Texture "h" "float" "imagemap" "string filename" "a.png"
+            "string encoding" "linear" "float scale" 2.55 "float uscale" 2 "string wrap" "clamp"
+            Material "diffuse" "texture displacement" "h" ObjectBegin "sheet"
+            Shape "plymesh" "string filename" "a.ply" ObjectEnd {}"#,
+            "ObjectInstance \"sheet\" ".repeat(uses)
+        );
+        let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
+        assert_eq!(scene.geometry.instances.len(), if uses > 1 { uses } else { 0 });
+        let found = scene.materials[0].surface.normal.as_ref().unwrap();
+        assert_eq!(found.image_from_uv, [[2.0, 0.0, 0.0], [0.0, -1.0, 1.0]]);
+        // 16 texels on 4 units along x, 8 on 2 along y.
+        let expected = Vec3::new(-0.04, -0.12, 1.0).normalize();
+        let normal = 2.0 * found.value(Vec2::splat(0.5)).truncate() - 1.0;
+        assert!(normal.abs_diff_eq(expected, 1e-3), "{uses}: {normal} {expected}");
+    }
+}
+
 #[test]
 fn media_and_illuminants_have_their_colours() {
     // Gold is yellow, copper red, silver and aluminium almost white.
