@@ -3,12 +3,13 @@
 use std::{
     env,
     fs::{self, File, FileType, OpenOptions},
-    io::{self, BufWriter, Read, Write},
+    io::{self, BufReader, BufWriter, Read, Write},
     path::{Path, PathBuf},
     process,
     time::Duration,
 };
 
+use flate2::read::MultiGzDecoder;
 use serde::Serialize;
 
 use crate::{
@@ -233,6 +234,18 @@ pub fn open_regular(path: &Path) -> Result<File> {
     File::open(path).map_err(io_error)
 }
 
+/// Opens a regular file for reading, decompressed by gzip if its extension is `gz`; returns the most bytes that
+/// it may hold too.
+pub(crate) fn open_unpacked(path: &Path) -> Result<(BufReader<Box<dyn Read>>, u64)> {
+    let file = open_regular(path)?;
+    let bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
+    let (reader, bytes): (Box<dyn Read>, u64) = match extension(path).as_str() {
+        "gz" => (Box::new(MultiGzDecoder::new(file)), bytes.saturating_mul(DEFLATE_LARGEST_RATIO)),
+        _ => (Box::new(file), bytes),
+    };
+    Ok((BufReader::with_capacity(1 << 16, reader), bytes))
+}
+
 /// Opens a device or standard stream for writing.
 ///
 /// Refuses other pipes, whose opening waits for a reader, except those in `/dev/fd`, which are open
@@ -349,6 +362,9 @@ pub fn check_replaces_nothing_in(name: &str, folder: &Path, inputs: &[&Path]) ->
 /// Largest compression of real pixels by OpenEXR's lossless methods; a header that promises more
 /// than this times the file's size is corrupt, and trusting it would exhaust memory.
 pub const EXR_LARGEST_RATIO: u64 = 4096;
+
+/// Largest compression of gzip, zlib and PNG, which bounds what a compressed file may promise.
+pub(crate) const DEFLATE_LARGEST_RATIO: u64 = 1032;
 
 /// Checks that a file of `file_bytes` bytes can hold the pixels that its header states, before
 /// memory is allocated for them.

@@ -9,7 +9,7 @@ use flate2::read::ZlibDecoder;
 
 use crate::{
     error::{Error, Result},
-    files::{self, little_endian},
+    files::{self, DEFLATE_LARGEST_RATIO, little_endian},
     mesh::Mesh,
 };
 
@@ -19,8 +19,6 @@ const HAS_COORDINATES: u32 = 0x0002;
 const HAS_COLORS: u32 = 0x0008;
 const FACE_NORMALS: u32 = 0x0010;
 const DOUBLE_PRECISION: u32 = 0x2000;
-/// Largest compression of zlib.
-const LARGEST_RATIO: u64 = 1032;
 /// Longest name of a mesh.
 const MAX_NAME: usize = 4096;
 
@@ -64,7 +62,7 @@ fn parse(bytes: &[u8], index: usize) -> Result<(Mesh, bool), String> {
     let (Some(mesh), Some(version)) = (mesh, header(start)) else {
         return Err(format!("mesh {index} does not begin where the file says"));
     };
-    let left = (mesh.len() as u64).saturating_mul(LARGEST_RATIO);
+    let left = (mesh.len() as u64).saturating_mul(DEFLATE_LARGEST_RATIO);
     Stream { decoder: ZlibDecoder::new(mesh), left }.mesh(version)
 }
 

@@ -1,13 +1,10 @@
 //! Files of a scene description: the main file, those that it includes, plain or compressed by gzip.
 
 use std::{
-    fs::File,
     io::{BufReader, Read},
     path::{Path, PathBuf},
     rc::Rc,
 };
-
-use flate2::read::MultiGzDecoder;
 
 use super::tokens::{Place, Token, Tokens};
 use crate::{beside::Folder, error::Result, files};
@@ -121,12 +118,6 @@ impl Source {
 }
 
 fn open(path: &Path, most_bytes: u64) -> Result<FileTokens> {
-    let file: File = files::open_regular(path)?;
-    let reader: Box<dyn Read> = if files::extension(path) == "gz" {
-        Box::new(MultiGzDecoder::new(file))
-    } else {
-        Box::new(file)
-    };
-    let reader = BufReader::with_capacity(1 << 16, reader);
+    let (reader, _) = files::open_unpacked(path)?;
     Ok(Tokens::new(Rc::from(path), reader, most_bytes))
 }

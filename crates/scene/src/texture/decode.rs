@@ -84,7 +84,7 @@ fn decode(
             return Ok(Texture { name: name.to_owned(), width, height, texels });
         }
         // Deflate, times the growth of one bit of a palette to four bytes.
-        Some(ImageFormat::Png) => 1032 * 32,
+        Some(ImageFormat::Png) => files::DEFLATE_LARGEST_RATIO * 32,
         // One bit for a block of 64 texels.
         Some(ImageFormat::Jpeg) => 64 * 32,
         // A run of 128 texels of four bytes in two bytes.

@@ -95,7 +95,7 @@ impl Element {
     }
 }
 
-impl<R: BufRead> Source<'_, R> {
+impl Source<'_> {
     fn header_line(&mut self) -> Result<String> {
         let mut bytes = Vec::new();
         self.reader

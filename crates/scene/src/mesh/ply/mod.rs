@@ -8,11 +8,10 @@
 mod header;
 
 use std::{
-    io::{BufRead, BufReader, ErrorKind},
+    io::{BufRead, BufReader, ErrorKind, Read},
     path::Path,
 };
 
-use flate2::read::MultiGzDecoder;
 use header::{Element, Encoding, Property, Scalar};
 
 use super::Mesh;
@@ -30,9 +29,6 @@ const UV_NAMES: [[&str; 2]; 4] =
 /// Names of colours, and of their opacity.
 const COLOR_NAMES: [[&str; 4]; 2] = [["red", "green", "blue", "alpha"], ["r", "g", "b", "a"]];
 
-/// Largest compression of gzip, which bounds what a compressed file may promise.
-const GZIP_LARGEST_RATIO: u64 = 1032;
-
 /// Bytes of a vertex (position, normal, coordinates) or of the triangles of a face.
 const ELEMENT_BYTES: u64 = 32;
 
@@ -41,16 +37,7 @@ const ELEMENT_BYTES: u64 = 32;
 /// # Errors
 /// [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
 pub fn read(path: &Path) -> Result<Mesh> {
-    let file = files::open_regular(path)?;
-    let file_bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
-    if files::extension(path) == "gz" {
-        let reader = BufReader::with_capacity(1 << 16, MultiGzDecoder::new(file));
-        return read_from(path, reader, file_bytes.saturating_mul(GZIP_LARGEST_RATIO));
-    }
-    read_from(path, BufReader::with_capacity(1 << 16, file), file_bytes)
-}
-
-fn read_from<R: BufRead>(path: &Path, reader: R, file_bytes: u64) -> Result<Mesh> {
+    let (reader, file_bytes) = files::open_unpacked(path)?;
     let mut source = Source { path, reader, encoding: Encoding::Ascii, bytes_read: 0, line: 1 };
     let elements = source.read_header()?;
     let mut mesh = Mesh::default();
@@ -123,16 +110,16 @@ struct Polygons {
 }
 
 /// Reader with its position in the file.
-struct Source<'a, R> {
+struct Source<'a> {
     path: &'a Path,
-    reader: R,
+    reader: BufReader<Box<dyn Read>>,
     encoding: Encoding,
     bytes_read: u64,
     /// Line of an ascii file, from 1.
     line: usize,
 }
 
-impl<R: BufRead> Source<'_, R> {
+impl Source<'_> {
     fn error(&self, message: impl Into<String>) -> Error {
         match self.encoding {
             Encoding::Ascii => Error::parse(self.path, self.line, 1, message),
