@@ -217,7 +217,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
 /// # Errors
 /// [`Error::Io`] for a folder and a file that cannot be read, [`Error::Format`] for a pipe, socket
 /// or device.
-pub fn open_regular(path: &Path) -> Result<File> {
+pub(crate) fn open_regular(path: &Path) -> Result<File> {
     let io_error = |source| Error::io(path, "read", source);
     // Look before opening, which waits for the writer of a pipe.
     let kind = fs::metadata(path).map_err(io_error)?.file_type();
@@ -314,7 +314,7 @@ fn identity(path: &Path) -> Option<(PathBuf, [u64; 2])> {
 }
 
 /// Tests whether two paths lead to the same file: through links, and also where it is not there yet.
-pub fn is_same_file(one: &Path, other: &Path) -> bool {
+pub(crate) fn is_same_file(one: &Path, other: &Path) -> bool {
     one == other || identity(one).is_some_and(|found| identity(other) == Some(found))
 }
 
@@ -361,7 +361,7 @@ pub fn check_replaces_nothing_in(name: &str, folder: &Path, inputs: &[&Path]) ->
 
 /// Largest compression of real pixels by OpenEXR's lossless methods; a header that promises more
 /// than this times the file's size is corrupt, and trusting it would exhaust memory.
-pub const EXR_LARGEST_RATIO: u64 = 4096;
+pub(crate) const EXR_LARGEST_RATIO: u64 = 4096;
 
 /// Largest compression of gzip, zlib and PNG, which bounds what a compressed file may promise.
 pub(crate) const DEFLATE_LARGEST_RATIO: u64 = 1032;
@@ -370,7 +370,7 @@ pub(crate) const DEFLATE_LARGEST_RATIO: u64 = 1032;
 /// memory is allocated for them.
 ///
 /// `ratio` is the largest compression of the format. Returns the message of an error.
-pub fn check_promise(
+pub(crate) fn check_promise(
     [width, height]: [u64; 2],
     bytes_per_pixel: u64,
     file_bytes: u64,

@@ -32,11 +32,11 @@ use exr::{
 
 use rayon::prelude::*;
 
-use crate::error::{Error, Result};
-use crate::files::{
-    EXR_LARGEST_RATIO, check_promise, is_special_file, open_regular, write_atomically,
+use crate::{
+    error::{Error, Result},
+    files::{EXR_LARGEST_RATIO, check_promise, is_special_file, open_regular, write_atomically},
+    memory,
 };
-use crate::memory;
 
 /// Primaries and white point of ITU-R BT.709 (red, green, blue, white; CIE x, y).
 const REC_709: Chromaticities = Chromaticities {

@@ -6,8 +6,10 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use glam::{Vec3, vec3};
 use rayon::prelude::*;
 
-use crate::math::{colour::luminance, cumulative::write_cumulative};
-use crate::measured::{layout::*, lookup};
+use crate::{
+    math::{colour::luminance, cumulative::write_cumulative},
+    measured::{layout::*, lookup},
+};
 
 /// Sampling table of one bin of outgoing elevation.
 pub(super) struct SamplingRow {

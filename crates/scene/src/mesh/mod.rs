@@ -4,11 +4,11 @@
 //! keep single precision and leave nothing but the arrays of [`Mesh`] behind.
 
 mod coincident;
-pub mod gltf;
+mod gltf;
 pub(crate) mod images;
 mod mtl;
-pub mod obj;
-pub mod ply;
+mod obj;
+pub(crate) mod ply;
 mod tangents;
 
 use std::{
