@@ -257,6 +257,92 @@ fn blobs_lie_on_the_surface_and_melt_together() {
     assert_eq!(characteristic, 4);
 }
 
+/// Part of `blobs`: the radii of an ellipsoid, or the other end of a cone with the radii of both.
+#[derive(Clone, Copy)]
+enum Part {
+    Ball(DVec3, DVec3),
+    Cone(DVec3, DVec3, [f64; 2]),
+}
+
+impl Part {
+    fn keys(self) -> String {
+        match self {
+            Self::Ball(at, radii) => format!("at = {}, radius = {}", list(at), list(radii)),
+            Self::Cone(at, to, [radius, to_radius]) => {
+                let ends = format!("at = {}, to = {}", list(at), list(to));
+                format!("{ends}, radius = {radius}, to_radius = {to_radius}")
+            }
+        }
+    }
+
+    /// Signed distance, of an ellipsoid by Quilez's bound.
+    fn distance(self, point: DVec3) -> f64 {
+        match self {
+            Self::Ball(center, radii) => {
+                let scaled = (point - center) / radii;
+                scaled.length() * (scaled.length() - 1.0) / (scaled / radii).length()
+            }
+            Self::Cone(from, to, [radius, to_radius]) => {
+                let axis = to - from;
+                let along = ((point - from).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
+                point.distance(from + along * axis) - radius - along * (to_radius - radius)
+            }
+        }
+    }
+}
+
+fn list(vector: DVec3) -> String {
+    format!("[{}, {}, {}]", vector.x, vector.y, vector.z)
+}
+
+/// Vertices lie where the joined distance of all parts is 0, along whose gradient their normals point,
+/// although blocks of the grid look at the parts near them alone.
+#[test]
+fn vertices_of_blobs_are_where_all_parts_say() {
+    let ball = |at: DVec3, radii: [f64; 3]| Part::Ball(at, radii.into());
+    let pair = [ball(DVec3::X, [0.5, 0.2, 0.3]), Part::Cone(DVec3::ZERO, DVec3::Y, [0.3, 0.1])];
+    let ring = (0..40).map(|index| {
+        let direction = DVec2::from_angle(f64::from(index));
+        let at = DVec3::new(direction.x, 0.02 * f64::from(index), direction.y);
+        if index % 2 == 0 {
+            ball(at, [0.3, 0.06, 0.15])
+        } else {
+            Part::Cone(at, DVec3::Y, [0.1, 0.05])
+        }
+    });
+    for (added, carved, blend) in [
+        (pair.to_vec(), ball(DVec3::Z, [0.8; 3]), 0.1),
+        (ring.collect(), ball(DVec3::Y, [0.3; 3]), 0.02),
+    ] {
+        let joined = |distances: &[f64]| {
+            let sum: f64 = distances.iter().map(|distance| (-distance / blend).exp()).sum();
+            -blend * sum.ln()
+        };
+        let distance = |point: DVec3| {
+            let all: Vec<_> = added.iter().map(|part| part.distance(point)).collect();
+            -joined(&[-joined(&all), carved.distance(point)])
+        };
+        let keys: String = added.iter().map(|part| format!("{{ {} }},\n", part.keys())).collect();
+        let carved_keys = format!("{{ {}, carve = true }}", carved.keys());
+        let keys = format!("cells = 80\nblend = {blend}\nballs = [\n{keys}{carved_keys} ]");
+        let mesh = shape("blobs", &keys).unwrap();
+        let axis = |at: usize| (at as f64 + 0.5) / 20.0 - 2.0;
+        let cells = (0..80_usize.pow(3)).map(|at| [at % 80, at / 80 % 80, at / 6400].map(axis));
+        let inside = cells.filter(|at| distance(DVec3::from(*at)) < 0.0).count();
+        assert_close(volume(&mesh), inside as f64 / 20.0_f64.powi(3), 0.03);
+        let mut far = 0;
+        for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
+            let [at, normal] = [position, normal].map(|v| DVec3::from(v.map(f64::from)));
+            let slope = |axis: DVec3| distance(at + 1e-4 * axis) - distance(at - 1e-4 * axis);
+            let gradient = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z));
+            let is_there = distance(at).abs() < 1e-3 && gradient.normalize().dot(normal) > 0.999;
+            far += usize::from(!is_there);
+        }
+        // Newton steps stay in their cells, which keeps a few vertices off sharp folds.
+        assert!(far * 100 < mesh.positions.len(), "{far} of {}", mesh.positions.len());
+    }
+}
+
 #[test]
 fn grids_are_sheets_of_their_thickness() {
     let flat = shape("grid", "size = [2.0, 3.0]\nthickness = 0.1\ncells = [8, 8]").unwrap();
