@@ -111,18 +111,12 @@ impl<'a> Library<'a> {
                     error(format!("expected `Kd` with three numbers from 0 to 1, found `{text}`"))
                 })?;
             }
-            "ks" => match color {
-                Some(color) => entry.specular = color.min(Vec3::ONE),
-                None => entry.ignore(features::MTL_KEY, "`Ks` that is no colour"),
-            },
-            "ke" => match color {
-                Some(color) => entry.emission = Some(color),
-                None => entry.ignore(features::MTL_KEY, "`Ke` that is no colour"),
-            },
-            "tf" => match color {
-                Some(color) => entry.filter = Some(color.min(Vec3::ONE)),
-                None => entry.ignore(features::MTL_KEY, "`Tf` that is no colour"),
-            },
+            "ks" | "ke" | "tf" if color.is_none() => {
+                entry.ignore(features::MTL_KEY, &format!("`{key}` that is no colour"));
+            }
+            "ks" => entry.specular = color.unwrap_or_default().min(Vec3::ONE),
+            "ke" => entry.emission = color,
+            "tf" => entry.filter = color.map(|color| color.min(Vec3::ONE)),
             "ns" => {
                 let exponent = numbers.first().filter(|n| n.is_finite() && **n > 0.0);
                 entry.exponent = exponent.copied().unwrap_or(0.0);
