@@ -225,10 +225,8 @@ pub(crate) fn open_regular(path: &Path) -> Result<File> {
         return Err(io_error(io::ErrorKind::IsADirectory.into()));
     }
     if !kind.is_file() {
-        return Err(Error::format(
-            path,
-            format!("expected a regular file, found {}", name_of(kind)),
-        ));
+        let message = format!("expected a regular file, found {}", name_of(kind));
+        return Err(Error::format(path, message));
     }
     stage::enter(format_args!("reading {}", path.display()));
     File::open(path).map_err(io_error)

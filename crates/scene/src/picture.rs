@@ -252,16 +252,12 @@ impl Image {
 
     fn write_exr_compressed(&self, path: &Path, compression: Compression) -> Result<()> {
         if self.channels.is_empty() || self.pixel_count() == 0 {
-            return Err(Error::format(
-                path,
-                format!(
-                    "an OpenEXR file needs at least one channel and one pixel, found {} channels \
-                     of {}x{} pixels",
-                    self.channels.len(),
-                    self.width,
-                    self.height
-                ),
-            ));
+            let (Self { width, height, .. }, channels) = (self, self.channels.len());
+            let message = format!(
+                "an OpenEXR file needs at least one channel and one pixel, found {channels} channels of \
+                 {width}x{height} pixels"
+            );
+            return Err(Error::format(path, message));
         }
         let channels = self
             .channels
@@ -366,17 +362,13 @@ impl Image {
                 other => other.values_as_f32().collect(),
             };
             if samples.len() != result.pixel_count() {
-                return Err(Error::format(
-                    path,
-                    format!(
-                        "channel {name} has {} samples, expected {} ({}x{}); subsampled channels \
-                         are not supported",
-                        samples.len(),
-                        result.pixel_count(),
-                        result.width,
-                        result.height
-                    ),
-                ));
+                let (found, Self { width, height, .. }) = (samples.len(), &result);
+                let message = format!(
+                    "channel {name} has {found} samples, expected {} ({width}x{height}); subsampled \
+                     channels are not supported",
+                    result.pixel_count()
+                );
+                return Err(Error::format(path, message));
             }
             result.channels.insert(name, samples);
         }

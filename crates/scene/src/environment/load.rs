@@ -82,10 +82,8 @@ impl EnvironmentMap {
             "exr" => read_exr,
             "pfm" => read_pfm,
             _ => {
-                return Err(Error::format(
-                    path,
-                    "unknown kind of environment map; expected .hdr, .exr or .pfm",
-                ));
+                let message = "unknown kind of environment map; expected .hdr, .exr or .pfm";
+                return Err(Error::format(path, message));
             }
         };
         let image = read(&files::read(path)?).map_err(|message| Error::format(path, message))?;
@@ -131,12 +129,9 @@ fn check_size(width: u64, height: u64) -> Result<(), String> {
             "{width}×{height} texels; expected at least 1×1 and at most {MAX_TEXELS} in all"
         ));
     }
-    let texels = width.saturating_mul(height);
-    memory::check(
-        format_args!("a map of {width}×{height} texels"),
-        texels.saturating_mul(TEXEL_BYTES),
-    )
-    .map_err(|shortage| shortage.to_string())
+    let bytes = width.saturating_mul(height).saturating_mul(TEXEL_BYTES);
+    memory::check(format_args!("a map of {width}×{height} texels"), bytes)
+        .map_err(|shortage| shortage.to_string())
 }
 
 fn read_hdr(bytes: &[u8]) -> Result<Image, String> {

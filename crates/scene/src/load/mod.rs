@@ -85,10 +85,8 @@ impl Scene {
         }
         let extension = files::extension(path);
         if !matches!(extension.as_str(), "toml" | "") && path.is_file() {
-            return Err(Error::format(
-                path,
-                format!("expected a scene in {SCENE_EXTENSIONS}, found .{extension}"),
-            ));
+            let message = format!("expected a scene in {SCENE_EXTENSIONS}, found .{extension}");
+            return Err(Error::format(path, message));
         }
         Self::parse_with(path, &files::read_text(path)?, options, &NONE)
     }

@@ -79,21 +79,17 @@ pub fn load(path: &Path) -> Result<MeasuredTable> {
 /// Reads the samples of a `.brdf` file, and the number of records that were left out.
 pub fn read(path: &Path) -> Result<(SampleSet, usize)> {
     let text = String::from_utf8(files::read(path)?).map_err(|error| {
-        Error::format(
-            path,
-            format!(
-                "expected the text of a .brdf file, found bytes that are not UTF-8 at byte {}; MERL \
-                 files end in .binary",
-                error.utf8_error().valid_up_to()
-            ),
-        )
+        let byte = error.utf8_error().valid_up_to();
+        let message = format!(
+            "expected the text of a .brdf file, found bytes that are not UTF-8 at byte {byte}; MERL files \
+             end in .binary"
+        );
+        Error::format(path, message)
     })?;
     let (samples, left_out) = parse(path, &text)?;
     if samples.is_empty() {
-        return Err(Error::format(
-            path,
-            "no usable record: all are below the surface or not finite",
-        ));
+        let message = "no usable record: all are below the surface or not finite";
+        return Err(Error::format(path, message));
     }
     Ok((SampleSet::new(samples), left_out))
 }
@@ -124,10 +120,7 @@ fn parse(path: &Path, text: &str) -> Result<(Vec<Sample>, usize)> {
     let Some((first, rest)) = numbers.split_first() else {
         return Err(Error::format(path, "empty: expected the count of wavelengths"));
     };
-    if !(first.value >= 1.0
-        && first.value <= LARGEST_WAVELENGTH_COUNT
-        && first.value.fract() == 0.0)
-    {
+    if !((1.0..=LARGEST_WAVELENGTH_COUNT).contains(&first.value) && first.value.fract() == 0.0) {
         let message = format!(
             "expected the count of wavelengths, an integer of 1 to {LARGEST_WAVELENGTH_COUNT}, \
              found {}",
@@ -137,10 +130,8 @@ fn parse(path: &Path, text: &str) -> Result<(Vec<Sample>, usize)> {
     }
     let count = first.value as usize;
     if rest.len() < count {
-        return Err(Error::format(
-            path,
-            format!("truncated: expected {count} wavelengths, found {}", rest.len()),
-        ));
+        let message = format!("truncated: expected {count} wavelengths, found {}", rest.len());
+        return Err(Error::format(path, message));
     }
     let (wavelengths, records) = rest.split_at(count);
     for pair in wavelengths.windows(2) {

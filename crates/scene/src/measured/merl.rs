@@ -50,17 +50,15 @@ pub fn load(path: &Path) -> Result<MeasuredTable> {
     let Some((header, values)) = bytes.split_first_chunk() else {
         return Err(wrong_size(path, found_bytes));
     };
-    let [theta_half, theta_difference, phi] = dimensions(*header);
-    if [theta_half, theta_difference, phi] != EXPECTED_DIMENSIONS {
-        let [expected_half, expected_difference, expected_phi] = EXPECTED_DIMENSIONS;
-        return Err(Error::format(
-            path,
-            format!(
-                "expected a MERL table of {expected_half} × {expected_difference} × {expected_phi} \
-                 cells (θ_h, θ_d, φ_d), the header says {theta_half} × {theta_difference} × {phi}; \
-                 tables of other sizes, such as those with 360 bins in φ_d, cannot be read"
-            ),
-        ));
+    let found = dimensions(*header);
+    if found != EXPECTED_DIMENSIONS {
+        let [expected, found] = [EXPECTED_DIMENSIONS, found]
+            .map(|[half, difference, phi]| format!("{half} × {difference} × {phi}"));
+        let message = format!(
+            "expected a MERL table of {expected} cells (θ_h, θ_d, φ_d), the header says {found}; tables of \
+             other sizes, such as those with 360 bins in φ_d, cannot be read"
+        );
+        return Err(Error::format(path, message));
     }
     if found_bytes != FILE_BYTES as u64 {
         return Err(wrong_size(path, found_bytes));

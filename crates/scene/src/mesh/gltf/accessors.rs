@@ -89,12 +89,8 @@ impl<'a> GltfReader<'a> {
     ) -> Result<Vec<T>> {
         let label = format!("accessor {}", accessor.index());
         let (count, size) = (accessor.count(), accessor.size());
-        memory::check_count(
-            format_args!("{}: {label}", self.path.display()),
-            count,
-            size_of::<T>(),
-        )
-        .map_err(Error::memory)?;
+        let asker = format_args!("{}: {label}", self.path.display());
+        memory::check_count(asker, count, size_of::<T>()).map_err(Error::memory)?;
         let mut elements: Vec<T> = match accessor.view() {
             Some(view) => {
                 self.slices(&label, &view, accessor.offset(), count, size)?.map(&element).collect()

@@ -150,14 +150,10 @@ fn check_positions(path: &Path, root: &Root) -> Result<()> {
         if let Some(accessor) = position.map(|index| index.value())
             && accessor >= root.accessors.len()
         {
-            return Err(Error::format(
-                path,
-                format!(
-                    "not a glTF document: a primitive's POSITION names accessor {accessor}, the \
-                     file has {}",
-                    root.accessors.len()
-                ),
-            ));
+            let count = root.accessors.len();
+            let message =
+                format!("a primitive's POSITION names accessor {accessor}, the file has {count}");
+            return Err(Error::format(path, format!("not a glTF document: {message}")));
         }
     }
     Ok(())

@@ -47,14 +47,12 @@ pub fn read(path: &Path) -> Result<Mesh> {
         let least = element.least_bytes(source.encoding);
         // An ascii file without a final newline is one byte shorter.
         if least > body_bytes + 1 {
-            return Err(Error::format(
-                path,
-                format!(
-                    "truncated: {} elements `{}` need at least {least} bytes, the file has \
-                     {body_bytes} after its header",
-                    element.count, element.name
-                ),
-            ));
+            let Element { name, count, .. } = element;
+            let message = format!(
+                "truncated: {count} elements `{name}` need at least {least} bytes, the file has \
+                 {body_bytes} after its header"
+            );
+            return Err(Error::format(path, message));
         }
     }
     let count = elements.iter().map(|element| element.count).fold(0, u64::saturating_add);
@@ -65,11 +63,9 @@ pub fn read(path: &Path) -> Result<Mesh> {
             "vertex" => source.read_vertices(element, &mut mesh)?,
             "face" => source.read_faces(element, vertex_count, &mut mesh, &mut polygons)?,
             "tristrips" if element.count > 0 => {
-                return Err(Error::format(
-                    path,
-                    "triangle strips (element `tristrips`) are not supported; write the mesh with \
-                     faces",
-                ));
+                let message = "triangle strips (element `tristrips`) are not supported; write the mesh \
+                               with faces";
+                return Err(Error::format(path, message));
             }
             _ => {
                 for index in 0..element.count {
@@ -136,10 +132,8 @@ impl Source<'_> {
         };
         let positions = [column("x"), column("y"), column("z")];
         if positions.contains(&None) {
-            return Err(Error::format(
-                self.path,
-                "expected the properties `x`, `y` and `z` of element `vertex`",
-            ));
+            let message = "expected the properties `x`, `y` and `z` of element `vertex`";
+            return Err(Error::format(self.path, message));
         }
         let normals = [column("nx"), column("ny"), column("nz")];
         let has_normals = !normals.contains(&None);
@@ -197,10 +191,8 @@ impl Source<'_> {
         if element.count > 0
             && !element.properties.iter().any(|p| is_indices(p) && p.list_count.is_some())
         {
-            return Err(Error::format(
-                self.path,
-                "expected the list property `vertex_indices` of element `face`",
-            ));
+            let message = "expected the list property `vertex_indices` of element `face`";
+            return Err(Error::format(self.path, message));
         }
         mesh.triangles.reserve_exact(element.count as usize);
         let mut corners = Vec::new();
