@@ -232,8 +232,8 @@ pub(crate) fn open_regular(path: &Path) -> Result<File> {
     File::open(path).map_err(io_error)
 }
 
-/// Opens a regular file for reading, decompressed by gzip if its extension is `gz`; returns the most bytes that
-/// it may hold too.
+/// Opens a regular file for reading, decompressed by gzip if its extension is `gz`; returns the most bytes
+/// that it may hold too.
 pub(crate) fn open_unpacked(path: &Path) -> Result<(BufReader<Box<dyn Read>>, u64)> {
     let file = open_regular(path)?;
     let bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
