@@ -359,9 +359,11 @@ fn sky_and_sun_are_those_of_mitsuba() {
         (Vec3::new(0.5, 0.2, -0.5), [0.06040344, 0.09969734, 0.16682282]),
         (Vec3::new(-0.3, 0.4, 0.2), [0.03280686, 0.05470972, 0.10282528]),
     ] {
-        let found = map.radiance(direction.normalize());
+        // The mean of both sides: at the pole a texel's centre lies beside the direction.
+        let side = |tilt: f32| map.radiance((direction.normalize() + tilt * Vec3::X).normalize());
+        let found = (side(2e-3) + side(-2e-3)) / 2.0;
         let error = (found / Vec3::from(expected) - 1.0).abs().max_element();
-        assert!(error < 2e-3, "{direction}: {found} {expected:?}");
+        assert!(error < 1e-3, "{direction}: {found} {expected:?}");
     }
     for (elevation, turbidity, expected) in [
         (25.3_f32, 3.0, [1.3508092, 1.036_220_9, 0.65123785]),
