@@ -248,8 +248,9 @@ fn a_missing_or_truncated_map_is_named() {
     let whole = fs::read(folder.path().join("sky.exr")).unwrap();
     folder.write("sky.exr", &whole[..whole.len() - 5]);
     assert_refused(&folder, &["error: sky.exr: not a readable OpenEXR file"]);
-    let folder = with_map("sky.png");
-    assert_refused(&folder, &["sky.png: ", "expected .hdr, .exr or .pfm"]);
+    let folder = with_map("sky.gif");
+    folder.write("sky.gif", "GIF89a");
+    assert_refused(&folder, &["sky.gif: expected a PNG", "EXR or PFM image"]);
 }
 
 #[test]

@@ -120,7 +120,10 @@ fn damaged_and_huge_images_are_refused() {
     let case = |bytes: &[u8], expected: &str| {
         assert_error(Texture::decode("image", bytes, &mut Vec::new()), &[expected]);
     };
-    case(b"", "expected a PNG, JPEG, WebP, TGA, HDR or EXR image, found another file");
+    case(
+        b"",
+        "expected a PNG, JPEG, WebP, TGA, BMP, PNM, HDR, EXR or PFM image, found another file",
+    );
     case(b"GIF89a", "found another file");
     let image: DynamicImage = image::RgbImage::new(4, 4).into();
     let png = encode(&image, ImageFormat::Png);

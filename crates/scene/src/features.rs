@@ -147,6 +147,7 @@ features! {
     MI_POLARIZED "polarisation of `pplastic`" "as `roughplastic`";
     MI_COATING "`coating` of other models than `diffuse`" "left out";
     MI_WEIGHTS "sum of `weights` of `mixturebsdf` other than 1" "their ratios count";
+    MI_CUT_LIGHT "light of `null`, or of a textured `mask`" "black, or as much as is opaque";
     MI_TWO_MODELS "second model of `twosided`" "the first is on both sides";
     MI_SPEC_TRANS "`spec_trans` between 0 and 1"
         "from ½ a rough dielectric, below none of it; as is a metal";

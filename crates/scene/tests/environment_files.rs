@@ -84,7 +84,11 @@ fn write_exr(path: &Path, channels: Vec<(&str, FlatSamples)>) {
 #[test]
 fn every_format_gives_the_same_map_with_the_first_row_on_top() {
     let folder = Folder::new();
-    let mut paths = vec![folder.write("map.hdr", hdr_bytes(8, 4, &texels()))];
+    let hdr = hdr_bytes(8, 4, &texels());
+    // Mitsuba and others write their own word, and the content tells the format.
+    let other = [b"#?RGBE", &hdr["#?RADIANCE".len()..]].concat();
+    let mut paths = vec![folder.write("map.hdr", &hdr), folder.write("map.rgbe", &other)];
+    paths.extend([folder.write("map.exr", &hdr), folder.write("map.png", &other)]);
     for (name, big_endian) in [("little.pfm", false), ("big.PFM", true)] {
         paths.push(folder.write(name, pfm_bytes(8, 4, &texels(), big_endian, false)));
     }
@@ -126,6 +130,19 @@ fn grey_files_give_grey_maps() {
     let path = folder.path().join("grey.exr");
     write_exr(&path, vec![("Y", FlatSamples::F32(grey.iter().map(|texel| texel.x).collect()))]);
     assert_eq!(load(&path).0.texels, grey);
+}
+
+#[test]
+fn images_of_8_bits_are_maps_of_srgb() {
+    let folder = Folder::new();
+    let (map, warnings) = load(&folder.write("map.ppm", b"P6\n2 1\n255\n\xff\x00\x80\xbc\xbc\xbc"));
+    assert!(warnings.is_empty(), "{warnings:?}");
+    // Values of the transfer function of IEC 61966-2-1.
+    let expected = [Vec3::new(1.0, 0.0, 0.215_861), Vec3::splat(0.502_886)];
+    assert!(
+        map.texels.iter().zip(expected).all(|(own, other)| own.abs_diff_eq(other, 1e-6)),
+        "{map:?}"
+    );
 }
 
 #[test]
@@ -183,10 +200,9 @@ fn damaged_files_are_refused_with_a_reason() {
             assert!(refusal(&path).len() > path.display().to_string().len() + 10);
         }
     }
-    let cases: [(&str, &[u8], &str); 12] = [
-        ("magic.hdr", &pfm, "not a readable Radiance file"),
-        ("magic.exr", &hdr, "not a readable OpenEXR file"),
-        ("magic.pfm", &exr, "PFM"),
+    let cases: [(&str, &[u8], &str); 11] = [
+        ("magic.hdr", b"no map", "not a readable Radiance file"),
+        ("magic.exr", b"no map", "not a readable OpenEXR file"),
         ("word.pfm", b"P6\n2 1\n-1\n", "expected PF or Pf, found \"P6\""),
         ("width.pfm", b"PF\nwide 1\n-1\n", "width: expected an integer, found \"wide\""),
         ("height.pfm", b"PF\n2 -1\n-1\n", "height: expected an integer, found \"-1\""),
@@ -199,7 +215,7 @@ fn damaged_files_are_refused_with_a_reason() {
             b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 400000 +X 800000\n",
             "800000×400000 texels",
         ),
-        ("map.jpg", b"", "expected .hdr, .exr or .pfm"),
+        ("map.jpg", b"", "expected a PNG"),
     ];
     for (name, bytes, expected) in cases {
         let message = refusal(&folder.write(name, bytes));

@@ -1081,7 +1081,7 @@ fn bad_text_is_one_error_with_file_line_and_column() {
     assert!(found.contains("expected UTF-8"), "{found}");
     for (text, expected) in [
         ("", "the file ends before WorldBegin"),
-        ("WorldBegin", "expected a Camera, found none"),
+        ("WorldBegin", "expected triangles or a camera, found neither"),
         ("Camera \"orthographic\" WorldBegin", "expected a perspective camera"),
         ("Scale 0 1 1 Camera \"perspective\" WorldBegin", "flattens space"),
         ("Shape \"sphere\" WorldBegin", "Shape before WorldBegin"),

@@ -62,7 +62,7 @@ where
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TextureEntry {
-    /// PNG, JPEG, WebP, TGA, HDR or EXR image.
+    /// PNG, JPEG, WebP, TGA, BMP, PNM, HDR, EXR or PFM image.
     pub texture: PathBuf,
     /// Repetitions of the image per unit of the texture coordinates, along u and v or both.
     #[serde(default)]

@@ -24,8 +24,8 @@ use crate::{
 /// Everything that a file of another format says.
 #[derive(Debug)]
 pub(crate) struct Imported {
-    /// Viewer, before its numbers are checked.
-    pub camera: CameraEntry,
+    /// Viewer, before its numbers are checked; none if the file has none.
+    pub camera: Option<CameraEntry>,
     pub film: FilmSettings,
     /// Settings of the render.
     pub asked: Asked,

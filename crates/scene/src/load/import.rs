@@ -35,9 +35,13 @@ impl Loader<'_> {
     /// Makes a scene of an imported file. The map of `--environment` replaces its own; a format without
     /// one is lit by white.
     pub(super) fn imported(&self, imported: Imported) -> Result<Scene> {
-        let empty = self.scene(&imported.camera, imported.film)?;
-        let Imported { asked, lamps, materials, geometry, variants, inputs, warnings, .. } =
+        let Imported { asked, lamps, materials, geometry, variants, inputs, mut warnings, .. } =
             imported;
+        let camera = match imported.camera {
+            Some(camera) => camera,
+            None => self.frame(&geometry, &mut warnings)?,
+        };
+        let empty = self.scene(&camera, imported.film)?;
         let mut scene =
             Scene { asked, lamps, materials, geometry, variants, inputs, warnings, ..empty };
         scene.environment = match (&self.options.environment, imported.environment) {

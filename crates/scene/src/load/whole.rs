@@ -43,23 +43,8 @@ impl Loader<'_> {
         let chosen = self.choose_camera(&mesh.cameras, &mut ignored)?;
         let (materials, geometry) = self.place_whole(&mesh, &mut ignored, &mut warnings)?;
         warnings.extend(ignored.warnings(self.path));
-        let (camera, aspect_ratio) = match chosen {
-            Some((camera, lens)) => (
-                camera_entry(camera, lens),
-                lens.aspect_ratio.filter(|ratio| *ratio > 0.0).unwrap_or(ASPECT_RATIO),
-            ),
-            None => {
-                let (entry, does) = self.frame(&geometry)?;
-                let CameraEntry { position: [x, y, z], look_at: [u, v, w], .. } = entry;
-                warnings.push(format!(
-                    "{}: no perspective camera; one that {does} takes its place: --look-from \
-                     {x:.3},{y:.3},{z:.3} --look-at {u:.3},{v:.3},{w:.3} --fov {}",
-                    self.path.display(),
-                    entry.vertical_fov_deg
-                ));
-                (entry, ASPECT_RATIO)
-            }
-        };
+        let aspect_ratio = chosen.and_then(|(_, lens)| lens.aspect_ratio);
+        let aspect_ratio = aspect_ratio.filter(|ratio| *ratio > 0.0).unwrap_or(ASPECT_RATIO);
         let height = (FILM_WIDTH as f32 / aspect_ratio).round();
         let film = FilmSettings {
             width: FILM_WIDTH,
@@ -70,7 +55,7 @@ impl Loader<'_> {
         let (environment, lamps) = (None, mesh.lamps);
         let asked = Asked::default();
         Ok(Imported {
-            camera,
+            camera: chosen.map(|(camera, lens)| camera_entry(camera, lens)),
             film,
             asked,
             environment,
@@ -203,19 +188,31 @@ impl Loader<'_> {
         Ok(dropped)
     }
 
-    /// Camera inside a room, else one that sees the whole bounding sphere of the bounding box, with a word
-    /// on it.
-    fn frame(&self, geometry: &Geometry) -> Result<(CameraEntry, &'static str)> {
+    /// Camera inside a room, else one that sees the whole bounding sphere of the bounding box; warns of it.
+    pub(super) fn frame(
+        &self,
+        geometry: &Geometry,
+        warnings: &mut Vec<String>,
+    ) -> Result<CameraEntry> {
         let Some([low, high]) = bounds(geometry.used_extent()) else {
             return Err(self.error("expected triangles or a camera, found neither"));
         };
-        if let Some(View { from, at }) = inside::view(geometry, low, high) {
-            return Ok((pinhole(from, at, Vec3::Y, INSIDE_FOV_DEG), "stands in the room"));
-        }
-        let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low).length());
-        let distance = radius / (0.5 * FRAMING_FOV_DEG).to_radians().sin();
-        let position = centre + distance * FRAMING_DIRECTION.normalize();
-        Ok((pinhole(position, centre, Vec3::Y, FRAMING_FOV_DEG), "frames the bounding box"))
+        let (position, look_at, fov, does) = match inside::view(geometry, low, high) {
+            Some(View { from, at }) => (from, at, INSIDE_FOV_DEG, "stands in the room"),
+            None => {
+                let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low).length());
+                let distance = radius / (0.5 * FRAMING_FOV_DEG).to_radians().sin();
+                let position = centre + distance * FRAMING_DIRECTION.normalize();
+                (position, centre, FRAMING_FOV_DEG, "frames the bounding box")
+            }
+        };
+        let ([x, y, z], [u, v, w]) = (position.to_array(), look_at.to_array());
+        warnings.push(format!(
+            "{}: no perspective camera; one that {does} takes its place: --look-from \
+             {x:.3},{y:.3},{z:.3} --look-at {u:.3},{v:.3},{w:.3} --fov {fov}",
+            self.path.display(),
+        ));
+        Ok(pinhole(position, look_at, Vec3::Y, fov))
     }
 }
 

@@ -13,7 +13,6 @@ use std::{
 
 use super::{
     Mesh, MeshMaterial,
-    images::Images,
     mtl::{Library, LibraryMaterial},
 };
 use glam::Vec3;
@@ -25,6 +24,7 @@ use crate::{
     files,
     material::{Material, MaterialKind},
     memory,
+    texture::TextureCache,
 };
 
 /// Ends a chain of vertices; also the normal or texture coordinates of a corner that has none.
@@ -108,7 +108,7 @@ struct ObjReader {
     material_indices: HashMap<String, usize>,
     /// The last material of each name in the libraries.
     library: HashMap<String, LibraryMaterial>,
-    images: Images,
+    images: TextureCache,
     ignored: Ignored,
     first_smoothing: Option<usize>,
 }

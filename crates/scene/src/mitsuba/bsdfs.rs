@@ -51,7 +51,11 @@ fn sheet(value: Value, transmitted: f32) -> Material {
 
 /// Material of a shape that names none.
 pub(super) fn default_of_shapes() -> Material {
-    let kind = MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) };
+    diffuse(0.5)
+}
+
+pub(super) fn diffuse(reflectance: f32) -> Material {
+    let kind = MaterialKind::Diffuse { reflectance: Vec3::splat(reflectance) };
     Material { name: "default".to_owned(), ..one_sided(kind) }
 }
 
@@ -79,8 +83,7 @@ impl Reader {
             "bumpmap" | "bump" => self.bump_map(&parameters)?,
             "normalmap" => self.normal_map(&parameters)?,
             "null" => {
-                let mut model =
-                    Material::new("", MaterialKind::Diffuse { reflectance: Vec3::ZERO });
+                let mut model = diffuse(0.0);
                 model.surface.opacity.factor = 0.0;
                 model
             }
@@ -142,8 +145,8 @@ impl Reader {
     }
 
     pub(super) fn inner(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
-        match parameters.objects("bsdf")?.first() {
-            Some(&inner) => self.model(inner),
+        match parameters.object("bsdf")? {
+            Some(inner) => self.model(inner),
             None => {
                 let kind = parameters.node.kind();
                 Err(parameters.node.error(format!("{kind}: expected a bsdf in it, found none")))
@@ -328,9 +331,12 @@ impl Reader {
     /// Metal; `alpha` is none for a smooth one.
     fn conductor(&mut self, parameters: &Parameters<'_>, alpha: Option<f32>) -> Result<Material> {
         let node = parameters.node;
-        let material = parameters.string("material")?;
         let eta = spectra::parameter(parameters, "eta", Role::Index)?;
         let k = spectra::parameter(parameters, "k", Role::Index)?;
+        // Deviation: Mitsuba 3.9.1 takes a mirror, and version 0.6, for which such files were made, copper.
+        let is_copper = node.version() < 2.0 && node.kind().ends_with("conductor");
+        let of_old = (is_copper && eta.is_none() && k.is_none()).then_some("Cu");
+        let material = parameters.string("material")?.or(of_old);
         let outside = match parameters.any("ext_eta")? {
             Some(node) if node.tag() != "string" => values::float(node)?,
             Some(node) => media::dielectric(values::value(node)?).unwrap_or(1.0),

@@ -97,6 +97,18 @@ impl<'a> Parameters<'a> {
         found.ok_or_else(|| self.node.error(format!("{kind}: expected the parameter `{name}`")))
     }
 
+    /// First object of a kind, if there is one; the others count as unused.
+    pub(super) fn object(&self, tag: &str) -> Result<Option<Node<'a>>> {
+        for child in self.node.children() {
+            let target = child.target()?;
+            if target.tag() == tag {
+                self.take(child);
+                return Ok(Some(target));
+            }
+        }
+        Ok(None)
+    }
+
     /// Objects of a kind (`bsdf`, `emitter`, …), references among them.
     pub(super) fn objects(&self, tag: &str) -> Result<Vec<Node<'a>>> {
         let mut objects = Vec::new();

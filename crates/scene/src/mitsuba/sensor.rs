@@ -34,7 +34,7 @@ impl Reader {
         root: Node<'_>,
         sensors: &[Node<'_>],
         name: Option<&str>,
-    ) -> Result<(CameraEntry, FilmSettings)> {
+    ) -> Result<(Option<CameraEntry>, FilmSettings)> {
         let chosen = match name {
             None => 0,
             Some(name) => {
@@ -53,7 +53,7 @@ impl Reader {
             }
         };
         let Some(&sensor) = sensors.get(chosen) else {
-            return Err(root.error("expected a sensor, found none"));
+            return Ok((None, self.film(&Parameters::new(root))?.settings));
         };
         for other in sensors.iter().filter(|other| other.index != sensor.index) {
             self.ignored.add(features::MI_SENSORS, || other.place());
@@ -72,7 +72,7 @@ impl Reader {
         }
         parameters.without_effect("near_clip far_clip shutter_open shutter_close");
         parameters.finish(&mut self.ignored);
-        Ok((camera, film.settings))
+        Ok((Some(camera), film.settings))
     }
 
     /// Takes the samples that a file asks for.
@@ -167,8 +167,7 @@ impl Reader {
     }
 
     fn film(&mut self, sensor: &Parameters<'_>) -> Result<Film> {
-        let films = sensor.objects("film")?;
-        let node = films.first().copied();
+        let node = sensor.object("film")?;
         let parameters = node.map(Parameters::new);
         let side = |name: &str, default: i64| match &parameters {
             Some(parameters) => Ok(parameters.integer(name)?.unwrap_or(default)),
@@ -216,8 +215,7 @@ impl Reader {
     }
 
     fn filter(&mut self, film: &Parameters<'_>) -> Result<Filter> {
-        let filters = film.objects("rfilter")?;
-        let Some(&node) = filters.first() else { return Ok(Filter::Gaussian) };
+        let Some(node) = film.object("rfilter")? else { return Ok(Filter::Gaussian) };
         let parameters = Parameters::new(node);
         let is_half = |name: &str| Ok((parameters.float(name)?.unwrap_or(0.5) - 0.5).abs() < 1e-6);
         let (filter, is_ours) = match node.kind() {

@@ -5,7 +5,11 @@ use std::{borrow::Cow, sync::Arc};
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
 use super::{
-    Reader, bsdfs::default_of_shapes, document::Node, parameters::Parameters, serialized,
+    Reader,
+    bsdfs::{default_of_shapes, diffuse},
+    document::Node,
+    parameters::Parameters,
+    serialized,
     transforms::NO_INVERSE,
 };
 use crate::{
@@ -13,6 +17,7 @@ use crate::{
     features, files,
     geometry::check_extent,
     instance::{Instance, MAX_INSTANCES},
+    material::Opacity,
     mesh::Mesh,
     quadrics,
     shapes::check_triangles,
@@ -149,12 +154,12 @@ impl Reader {
             return Err(node.error("a shapegroup contains itself, or is nested too deep"));
         };
         let parameters = Parameters::new(node);
-        let groups = parameters.objects("shape")?;
-        let Some(group) = groups.first().filter(|group| group.kind() == "shapegroup") else {
+        let group = parameters.object("shape")?;
+        let Some(group) = group.filter(|group| group.kind() == "shapegroup") else {
             return Err(node.error("instance: expected a reference to a shapegroup"));
         };
         let matrix = outer * parameters.transform("to_world")?;
-        let inside = Parameters::new(*group);
+        let inside = Parameters::new(group);
         for shape in inside.objects("shape")? {
             self.place(shape, matrix, groups_left)?;
         }
@@ -277,8 +282,8 @@ impl Reader {
 
     /// Material of a shape's model and light, shared by shapes of the same.
     fn material(&mut self, parameters: &Parameters<'_>) -> Result<u32> {
-        let model = parameters.objects("bsdf")?.first().copied();
-        let light = parameters.objects("emitter")?.first().copied();
+        let model = parameters.object("bsdf")?;
+        let light = parameters.object("emitter")?;
         let interior = parameters.any("interior")?;
         let key = [model, light, interior].map(|node| node.map(|node| node.index));
         if let Some(&material) = self.material_numbers.get(&key) {
@@ -286,10 +291,22 @@ impl Reader {
         }
         let mut material = match model {
             Some(node) => self.model(node)?,
+            None if light.is_some() => diffuse(0.0),
             None => default_of_shapes(),
         };
         if let Some(light) = light {
-            material.surface.emission = Some(self.emission(light)?);
+            let mut emission = self.emission(light)?;
+            // Mitsuba's lights shine where their surface is cut away too.
+            let opacity = &mut material.surface.opacity;
+            if opacity.factor == 0.0 || opacity.texture.is_some() {
+                self.ignored.add(features::MI_CUT_LIGHT, || light.place());
+            }
+            if opacity.factor == 0.0 {
+                *opacity = Opacity::default();
+            } else {
+                emission.radiance /= opacity.factor;
+            }
+            material.surface.emission = Some(emission);
             material.name += &format!(", light of {}", light.place());
         }
         if let Some(medium) = interior {

@@ -44,7 +44,7 @@ pub(super) fn color(node: Node<'_>, role: Role) -> Result<Vec3> {
     let color = match node.tag() {
         "float" | "integer" => Vec3::splat(float(node)?),
         "rgb" | "srgb" | "color" => rgb(node, value(node)?, node.tag() == "srgb")?,
-        "spectrum" => of_spectrum(node, role)?,
+        "spectrum" => color_of_kind(node, role)?,
         "blackbody" => {
             let attribute = |name: &str| node.attribute(name).map(|text| number(node, text));
             let Some(kelvin) = node.attribute("temperature") else {
@@ -75,7 +75,7 @@ pub(super) fn color(node: Node<'_>, role: Role) -> Result<Vec3> {
 /// As [`color`], and for colours that are no spectrum and above 1.
 pub(super) fn reflectance(node: Node<'_>, ignored: &mut Ignored) -> Result<Vec3> {
     if node.tag() == "spectrum" {
-        let color = of_spectrum(node, Role::Reflectance)?.as_dvec3();
+        let color = color_of_kind(node, Role::Reflectance)?.as_dvec3();
         return Ok(clipped(color, features::MI_GAMUT, ignored, || node.place()).as_vec3());
     }
     let color = color(node, Role::Reflectance)?;
@@ -109,7 +109,8 @@ fn rgb(node: Node<'_>, text: &str, is_encoded: bool) -> Result<Vec3> {
     Ok(Vec3::from_array(if is_encoded { color.map(srgb_to_linear) } else { color }))
 }
 
-fn of_spectrum(node: Node<'_>, role: Role) -> Result<Vec3> {
+/// Colour of a spectrum by its type, as that of a texture may be too.
+pub(super) fn color_of_kind(node: Node<'_>, role: Role) -> Result<Vec3> {
     let parameters = Parameters::new(node);
     match node.kind() {
         "" => {}
@@ -118,11 +119,12 @@ fn of_spectrum(node: Node<'_>, role: Role) -> Result<Vec3> {
             let scale = parameters.float("scale")?.unwrap_or(1.0);
             return Ok(blackbody(node, f64::from(kelvin))? * scale);
         }
-        "d65" => return Ok(Vec3::splat(parameters.float("scale")?.unwrap_or(1.0))),
-        "uniform" => return Ok(uniform(parameters.float("value")?.unwrap_or(1.0), role)),
-        "srgb" | "rgb" => {
-            let color = parameters.any("color")?.or(parameters.any("value")?);
-            return color.map_or(Ok(Vec3::ONE), |color| rgb(color, value(color)?, false));
+        // Mitsuba 3.9.1 takes equal energy of this type for white, though not that of one number.
+        "uniform" => return Ok(Vec3::splat(parameters.float("value")?.unwrap_or(1.0))),
+        "d65" | "srgb" | "rgb" => {
+            let scale = parameters.float("scale")?.unwrap_or(1.0);
+            let own = parameters.any("color")?.or(parameters.any("value")?);
+            return Ok(scale * own.map_or(Ok(Vec3::ONE), |own| color(own, role))?);
         }
         "irregular" => {
             let list = |name: &str| numbers(node, parameters.string(name)?.unwrap_or_default());
@@ -163,7 +165,9 @@ fn of_spectrum(node: Node<'_>, role: Role) -> Result<Vec3> {
     let text = value(node)?;
     if !text.contains(':') {
         return match numbers(node, text)?[..] {
-            [all] => Ok(uniform(all as f32, role)),
+            // Deviation: Mitsuba 3.9.1 takes this for equal energy in files of all versions.
+            [all] if role == Role::Light && node.version() >= 2.0 => Ok(rgb_of(|_| all, role)),
+            [all] => Ok(Vec3::splat(all as f32)),
             // Version 0.6 in its usual build has three bins, which are red, green and blue.
             _ => rgb(node, text, false),
         };
@@ -178,14 +182,6 @@ fn of_spectrum(node: Node<'_>, role: Role) -> Result<Vec3> {
         list.push([number(node, wavelength)?, number(node, value)?]);
     }
     integrate(node, list, role)
-}
-
-/// Colour of a spectrum that is the same at all wavelengths.
-fn uniform(value: f32, role: Role) -> Vec3 {
-    match role {
-        Role::Light => rgb_of(|_| f64::from(value), role),
-        Role::Reflectance | Role::Index => Vec3::splat(value),
-    }
 }
 
 /// Colour of values at wavelengths in nanometres, linear between them and 0 beyond.

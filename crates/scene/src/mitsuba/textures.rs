@@ -100,28 +100,35 @@ impl Reader {
             "checkerboard" => Value::Texture(checkerboard(&parameters, &mut self.ignored)?),
             "mesh_attribute" | "vertexcolors" => {
                 let name = parameters.string("name")?.unwrap_or("vertex_color");
-                if name != "vertex_color" {
-                    let message =
-                        format!("mesh_attribute: expected `vertex_color`, found `{name}`");
-                    return Err(node.error(message));
+                let scale = Vec3::splat(parameters.float("scale")?.unwrap_or(1.0));
+                if name == "vertex_color" {
+                    Value::Vertices(scale)
+                } else {
+                    self.unknown_texture(&format!("mesh_attribute` of `{name}"), node)
                 }
-                Value::Vertices(Vec3::splat(parameters.float("scale")?.unwrap_or(1.0)))
+            }
+            "uniform" | "srgb" | "d65" => {
+                return spectra::color_of_kind(node, Role::Light).map(Value::Color);
             }
             "scale" if scales_left > 0 => self.scaled(&parameters, scales_left)?,
             found => {
-                let name = format!("texture `{found}`, which is 0.5");
-                self.ignored.add_named(features::MI_TEXTURE, &name, || node.place());
-                return Ok(Value::Color(Vec3::splat(0.5)));
+                return Ok(self.unknown_texture(found, node));
             }
         };
         parameters.finish(&mut self.ignored);
         Ok(value)
     }
 
+    fn unknown_texture(&mut self, found: &str, node: Node<'_>) -> Value {
+        let name = format!("texture `{found}`, which is 0.5");
+        self.ignored.add_named(features::MI_TEXTURE, &name, || node.place());
+        Value::Color(Vec3::splat(0.5))
+    }
+
     /// Texture of version 0.6 that multiplies another.
     fn scaled(&mut self, parameters: &Parameters<'_>, scales_left: usize) -> Result<Value> {
         let node = parameters.node;
-        let Some(&inner) = parameters.objects("texture")?.first() else {
+        let Some(inner) = parameters.object("texture")? else {
             return Err(node.error("scale: expected a texture in it, found none"));
         };
         let factor = spectra::parameter(parameters, "scale", Role::Index)?.unwrap_or(Vec3::ONE);
@@ -132,18 +139,18 @@ impl Reader {
         })
     }
 
-    /// Image of a file; none if that is not there.
+    /// Image of a file; none if that is not there, or none that can be read.
     fn bitmap(&mut self, parameters: &Parameters<'_>) -> Result<Option<TextureUse>> {
         let node = parameters.node;
         let Some(name) = parameters.string("filename")? else {
             return Err(node.error("bitmap: expected the parameter `filename`"));
         };
-        let Some(path) = node.file_if_there(name)? else {
+        let Ok(Some(path)) = node.file_if_there(name) else {
             self.ignored.add(features::MI_MISSING, || format!("`{name}`, {}", node.place()));
             return Ok(None);
         };
-        let loaded = self.textures.load(&path, &mut self.warnings);
-        let texture = loaded.map_err(|error| node.error(error.to_string()))?;
+        let texture = self.textures.load_readable(&path, &node.place(), &mut self.warnings);
+        let Some(texture) = texture else { return Ok(None) };
         self.inputs.push(path);
         // Version 0.6 states an exponent; only that of linear values is different from sRGB.
         let is_linear = parameters.float("gamma")? == Some(1.0);
@@ -162,7 +169,8 @@ impl Reader {
             })
         };
         let both = wrap("wrap_mode", Wrap::Repeat)?;
-        let interpolation = match parameters.string("filter_type")? {
+        let filter_type = parameters.string("filter_type")?.map(str::to_lowercase);
+        let interpolation = match filter_type.as_deref() {
             Some("nearest") => Interpolation::Nearest,
             None | Some("bilinear" | "trilinear" | "ewa") => Interpolation::Bilinear,
             Some(found) => {
@@ -232,8 +240,9 @@ fn image_from_uv(parameters: &Parameters<'_>) -> Result<[[f32; 3]; 2]> {
     if !u.iter().chain(&v).all(|number| number.is_finite()) {
         return Err(parameters.node.error("to_uv: expected finite numbers"));
     }
+    let both = parameters.float("uvscale")?.unwrap_or(1.0);
     for (row, axis) in [(&mut u, "u"), (&mut v, "v")] {
-        let scale = parameters.float(&format!("{axis}scale"))?.unwrap_or(1.0);
+        let scale = parameters.float(&format!("{axis}scale"))?.unwrap_or(both);
         row[2] += parameters.float(&format!("{axis}offset"))?.unwrap_or(0.0);
         row.iter_mut().for_each(|number| *number *= scale);
     }

@@ -65,14 +65,15 @@ pub(super) fn vector(node: Node<'_>, absent: [f64; 3]) -> Result<DVec3> {
 
 /// Deviation: an axis counts as one of length 1; Mitsuba 3.9.1 takes its length for a distortion.
 fn rotation(node: Node<'_>) -> Result<DMat4> {
-    let axis = vector(node, [0.0; 3])?;
-    let Some(axis) = axis.try_normalize() else {
-        return Err(node.error("rotate: expected an axis, as y=\"1\", found none"));
-    };
     let Some(angle) = node.attribute("angle") else {
         return Err(node.error("rotate: expected the attribute `angle` in degrees"));
     };
-    Ok(DMat4::from_quat(DQuat::from_axis_angle(axis, number(node, angle)?.to_radians())))
+    let angle = number(node, angle)?.to_radians();
+    match vector(node, [0.0; 3])?.try_normalize() {
+        Some(axis) => Ok(DMat4::from_quat(DQuat::from_axis_angle(axis, angle))),
+        None if angle == 0.0 => Ok(DMat4::IDENTITY),
+        None => Err(node.error("rotate: expected an axis, as y=\"1\", found none")),
+    }
 }
 
 /// Matrix of 16 or 9 numbers, row by row.

@@ -1,7 +1,5 @@
 //! Camera, film and filter of a scene description.
 
-use std::path::Path;
-
 use glam::{DMat4, DVec3};
 
 use super::{
@@ -9,17 +7,12 @@ use super::{
     log::Log,
     parameters::{Entity, Kind},
 };
-use crate::{
-    FilmSettings, Filter,
-    error::{Error, Result},
-    features,
-    file::CameraEntry,
-};
+use crate::{FilmSettings, Filter, error::Result, features, file::CameraEntry};
 
 /// Viewer and image plane.
 pub(super) struct View {
-    /// Camera in the space of the renderer.
-    pub camera: CameraEntry,
+    /// Camera in the space of the renderer, if the file has one.
+    pub camera: Option<CameraEntry>,
     pub film: FilmSettings,
     /// Radiance of the picture over that of the scene.
     pub exposure: f32,
@@ -32,10 +25,11 @@ pub(super) struct View {
 /// pbrt looks along +z with +x to the right and +y up, so that a camera without a mirror shows a
 /// left-handed world. The renderer is right-handed. If the camera does not mirror already, the whole
 /// world is mirrored in z, and the picture is the same.
-pub(super) fn view(description: &Description, main: &Path, log: &mut Log) -> Result<View> {
+pub(super) fn view(description: &Description, log: &mut Log) -> Result<View> {
     let (film, mut exposure, aspect) = film(description, log)?;
+    let left_handed = DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0));
     let Some((entity, camera_from_world)) = &description.camera else {
-        return Err(Error::scene(main, "expected a Camera, found none"));
+        return Ok(View { camera: None, film, exposure, mirror: left_handed });
     };
     if entity.name != "perspective" {
         return Err(entity.error("expected a perspective camera; others cannot be used"));
@@ -45,11 +39,7 @@ pub(super) fn view(description: &Description, main: &Path, log: &mut Log) -> Res
     if !world_from_camera.is_finite() || determinant == 0.0 {
         return Err(entity.error("the transformation of the camera flattens space"));
     }
-    let mirror = if determinant > 0.0 {
-        DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0))
-    } else {
-        DMat4::IDENTITY
-    };
+    let mirror = if determinant > 0.0 { left_handed } else { DMat4::IDENTITY };
     let open = entity.number("shutteropen", 0.0)?;
     let time = entity.number("shutterclose", 1.0)? - open;
     if time <= 0.0 {
@@ -74,7 +64,7 @@ pub(super) fn view(description: &Description, main: &Path, log: &mut Log) -> Res
         focus_distance: Some(focus_distance as f32),
     };
     log.unused(entity);
-    Ok(View { camera, film, exposure, mirror })
+    Ok(View { camera: Some(camera), film, exposure, mirror })
 }
 
 /// Field of view from bottom to top; `fov` is that of the shorter side.

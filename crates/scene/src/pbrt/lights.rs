@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
-use super::{log::Log, parameters::Entity, spectra, textures::Textures};
+use super::{parameters::Entity, spectra, textures::Textures};
 use crate::{
     EnvironmentMap, Lamp,
     error::Result,
@@ -17,7 +17,6 @@ use crate::{
     lamp::{LampKind, Spot, SpotFalloff},
     material::Emission,
     math::colour::luminance,
-    texture::{Encoding, Texture},
 };
 
 /// Largest side of an equal-area map, texels.
@@ -181,8 +180,8 @@ impl Lights {
             return Err(color.place.error(format!("{}: {message}", entity.label())));
         }
         let path = textures.folder.file(file).map_err(|message| entity.error(message))?;
-        let mut map =
-            read_map(&path, &mut textures.log).map_err(|error| entity.error(error.to_string()))?;
+        let mut map = EnvironmentMap::read(&path, 1.0, &mut textures.log.warnings)
+            .map_err(|error| entity.error(error.to_string()))?;
         if map.width != map.height || map.width > MAX_SIDE {
             return Err(entity.error(format!(
                 "{}: expected a square equal-area map of at most {MAX_SIDE} texels a side, found \
@@ -251,18 +250,6 @@ fn enlarge(texels: Vec<Vec3>, side: u32, wanted: u32) -> Vec<Vec3> {
     let at = |index: u32| (u64::from(index) * u64::from(side) / u64::from(wanted)) as usize;
     let rows = (0..wanted).flat_map(|row| (0..wanted).map(move |column| (row, column)));
     rows.map(|(row, column)| texels[at(row) * side as usize + at(column)]).collect()
-}
-
-/// Reads an image of radiance: high dynamic range, or 8-bit sRGB.
-fn read_map(path: &std::path::Path, log: &mut Log) -> Result<EnvironmentMap> {
-    if matches!(crate::files::extension(path).as_str(), "hdr" | "exr" | "pfm") {
-        return EnvironmentMap::read(path, 1.0, &mut log.warnings);
-    }
-    let image = Texture::load(path, &mut log.warnings)?;
-    let texels = image.linear_texels(Encoding::Srgb);
-    let texels = texels.iter().map(|&[red, green, blue, _]| Vec3::new(red, green, blue)).collect();
-    let (width, height) = (image.width, image.height);
-    Ok(EnvironmentMap { width, height, texels, rotation_rad: 0.0, source: image.name })
 }
 
 /// Illuminance of a plane that faces +z of a square equal-area map.

@@ -75,7 +75,7 @@ pub(crate) fn is_pbrt(path: &Path) -> bool {
 pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
     let (mut description, folder, mut log) = Reader::read(path, folder)?;
     let asked = asked(&description, &mut log);
-    let view = camera::view(&description, path, &mut log)?;
+    let view = camera::view(&description, &mut log)?;
     // A shape's numbers are dropped when its mesh is made.
     let shapes = std::mem::take(&mut description.shapes);
     let mut textures = Textures::new(&description, &folder, log);

@@ -1,7 +1,7 @@
 //! Image files by path, each decoded once.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::{BTreeMap, BTreeSet, HashSet},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -15,6 +15,7 @@ use crate::error::Result;
 #[derive(Debug, Default)]
 pub struct TextureCache {
     textures: BTreeMap<PathBuf, Arc<Texture>>,
+    unreadable: HashSet<PathBuf>,
 }
 
 type Decoded = (Arc<Texture>, Vec<String>);
@@ -79,6 +80,25 @@ impl TextureCache {
         let texture = Arc::new(Texture::load(path, warnings)?);
         self.textures.insert(key, Arc::clone(&texture));
         Ok(texture)
+    }
+
+    /// As [`TextureCache::load`]; a file that is missing or no image is one warning and no texture. `place`
+    /// says who names it.
+    pub(crate) fn load_readable(
+        &mut self,
+        path: &Path,
+        place: &str,
+        warnings: &mut Vec<String>,
+    ) -> Option<Arc<Texture>> {
+        if self.unreadable.contains(path) {
+            return None;
+        }
+        self.load(path, warnings)
+            .inspect_err(|error| {
+                warnings.push(format!("{error}; rendered without this texture ({place})"));
+                self.unreadable.insert(path.to_owned());
+            })
+            .ok()
     }
 
     /// Adds a texture that is in no file, under the path of one.

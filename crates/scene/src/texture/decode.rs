@@ -1,4 +1,4 @@
-//! Image files → [`Texture`]: PNG, JPEG, WebP, TGA, Radiance `.hdr` and OpenEXR.
+//! Image files → [`Texture`]: PNG, JPEG, WebP, TGA, BMP, PNM, Radiance `.hdr`, OpenEXR and PFM.
 //!
 //! The uses of a texture say how its colours are encoded. Statements of the file about that, as PNG's
 //! `gAMA`, `cHRM` and `iCCP`, count for nothing, as glTF 2.0 demands (section 3.9.2); an image that is
@@ -12,6 +12,7 @@ use super::{
     Texels, Texture,
     check::{MAX_TEXTURE_SIDE, Repairs, check_size},
     exr,
+    floats::{self, PFM_SIGNATURES, RADIANCE_SIGNATURE},
 };
 use crate::{
     error::{Error, Result},
@@ -72,8 +73,19 @@ fn decode(
     format: Option<ImageFormat>,
     warnings: &mut Vec<String>,
 ) -> Result<Texture, String> {
-    let guessed = image::guess_format(bytes).ok().or(format);
+    let check = |size| check_size(size, 4, bytes.len(), u64::MAX);
+    if PFM_SIGNATURES.iter().any(|signature| bytes.starts_with(signature)) {
+        return Texture::of_image(name, &floats::pfm(bytes, check)?, warnings);
+    }
+    let is_radiance = bytes.starts_with(RADIANCE_SIGNATURE);
+    let guessed = match image::guess_format(bytes) {
+        _ if is_radiance => Some(ImageFormat::Hdr),
+        guessed => guessed.ok().or(format),
+    };
     let ratio = match guessed {
+        Some(ImageFormat::Hdr) => {
+            return Texture::of_image(name, &floats::radiance(bytes, check)?, warnings);
+        }
         Some(ImageFormat::OpenExr) => {
             let check = |size: [u64; 2], texel_bytes: u64| {
                 check_size(size, texel_bytes, bytes.len(), files::EXR_LARGEST_RATIO)
@@ -89,13 +101,16 @@ fn decode(
         Some(ImageFormat::Jpeg) => 64 * 32,
         // A run of 128 texels of four bytes in two bytes.
         Some(ImageFormat::Tga) => 256,
-        // A run of 127 texels of four channels in two bytes each, and four bytes for one.
-        Some(ImageFormat::Hdr) => 255 * 4,
+        // A run of 255 texels in two bytes.
+        Some(ImageFormat::Bmp) => 512,
+        // One bit for a texel.
+        Some(ImageFormat::Pnm) => 8,
         // An image of one colour takes no more bytes if it is larger.
         Some(ImageFormat::WebP) => u64::MAX,
         _ => {
             return Err(
-                "expected a PNG, JPEG, WebP, TGA, HDR or EXR image, found another file".to_owned()
+                "expected a PNG, JPEG, WebP, TGA, BMP, PNM, HDR, EXR or PFM image, found another file"
+                    .to_owned()
             );
         }
     };
@@ -118,18 +133,7 @@ fn decode(
     let color = image.color();
     let texels = match color.bytes_per_pixel() / color.channel_count() {
         1 => Texels::Bytes(fours(image.into_rgba8().into_raw())),
-        2 => Texels::Shorts(fours(image.into_rgba16().into_raw())),
-        _ => {
-            let mut repairs = Repairs::default();
-            let pixels = image.into_rgb32f();
-            let texels = pixels.pixels().map(|pixel| {
-                let [red, green, blue] = pixel.0;
-                repairs.texel([red, green, blue, 1.0])
-            });
-            let texels = Texels::Halves(texels.collect());
-            repairs.warn(name, warnings);
-            texels
-        }
+        _ => Texels::Shorts(fours(image.into_rgba16().into_raw())),
     };
     Ok(Texture { name: name.to_owned(), width, height, texels })
 }

@@ -8,6 +8,9 @@ use exr::{
     prelude::{ReadChannels, ReadLayers, ReadSpecificChannel},
 };
 
+/// First bytes of an OpenEXR file.
+pub(crate) const SIGNATURE: &[u8] = &exr::meta::magic_number::BYTES;
+
 /// Texels as they are read, with the width that places them, and what was noticed on the way.
 struct Canvas<T, N> {
     width: usize,

@@ -4,6 +4,7 @@ mod cache;
 mod check;
 mod decode;
 pub(crate) mod exr;
+pub(crate) mod floats;
 mod linear;
 pub mod lookup;
 pub(crate) mod texelwise;

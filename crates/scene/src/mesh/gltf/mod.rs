@@ -23,13 +23,13 @@ use gltf::{Document, Node, buffer::Source};
 use serde_json::Value;
 
 use self::{material::Pane, skin::Place};
-use super::{Mesh, MeshCamera, images::Images};
+use super::{Mesh, MeshCamera};
 use crate::{
     error::{Error, Result},
     features::Ignored,
     files,
     instance::Budget,
-    texture::Texture,
+    texture::{Texture, TextureCache},
 };
 
 const GLB_HEADER_BYTES: usize = 12;
@@ -81,7 +81,7 @@ pub fn read(
         materials: HashMap::new(),
         panes: HashMap::new(),
         embedded: HashMap::new(),
-        images: Images::default(),
+        images: TextureCache::default(),
         cameras: Vec::new(),
         ignored: Ignored::default(),
         warnings,
@@ -134,7 +134,7 @@ struct GltfReader<'a> {
     panes: HashMap<usize, Pane>,
     /// Images inside the document by their numbers; none for those that cannot be read.
     embedded: HashMap<usize, Option<Arc<Texture>>>,
-    images: Images,
+    images: TextureCache,
     /// Cameras of the nodes with their numbers in the file.
     cameras: Vec<(usize, MeshCamera)>,
     ignored: Ignored,

@@ -99,7 +99,7 @@ impl GltfReader<'_> {
                 Some(Some(bytes)) => Texture::decode(&name, &bytes, self.warnings),
                 Some(None) => Err("not base64 data".to_owned()),
                 None => match document::beside(self.path, uri) {
-                    Ok(path) => return Ok(self.images.load(&path, place, self.warnings)),
+                    Ok(path) => return Ok(self.images.load_readable(&path, place, self.warnings)),
                     Err(error) => Err(error.to_string()),
                 },
             }

@@ -2,10 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::{
-    mesh::images::Images,
-    texture::{Channels, Encoding, TextureUse, Wrap},
-};
+use crate::texture::{Channels, Encoding, TextureCache, TextureUse, Wrap};
 
 pub(super) struct Map {
     pub(super) path: PathBuf,
@@ -119,10 +116,10 @@ impl Map {
         &self,
         channels: Channels,
         encoding: Encoding,
-        images: &mut Images,
+        images: &mut TextureCache,
         warnings: &mut Vec<String>,
     ) -> Option<TextureUse> {
-        let texture = images.load(&self.path, &self.place, warnings)?;
+        let texture = images.load_readable(&self.path, &self.place, warnings)?;
         let Options { scale, offset, clamps, base_gain: [base, gain], .. } = self.options;
         Some(TextureUse {
             channels,

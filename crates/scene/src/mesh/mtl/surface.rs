@@ -10,9 +10,9 @@ use crate::{
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
     mesh::{
         MeshMaterial,
-        images::{Images, has_alpha, holds_normals, opacity_of},
+        images::{has_alpha, holds_normals, opacity_of},
     },
-    texture::{Channels, Encoding},
+    texture::{Channels, Encoding, TextureCache},
 };
 
 /// Roughness of a material that states no more than its metallic share.
@@ -28,7 +28,7 @@ impl LibraryMaterial {
     /// Returns the material of the scene; reads its images.
     pub(in crate::mesh) fn finish(
         &self,
-        images: &mut Images,
+        images: &mut TextureCache,
         warnings: &mut Vec<String>,
     ) -> MeshMaterial {
         let color_map = self.color_map.as_ref();
