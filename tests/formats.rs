@@ -205,7 +205,6 @@ fn everything_that_an_obj_file_loses_is_named_once() {
     let scene = Scene::load(&path).unwrap();
     let found = warnings(&scene);
     let expected = [
-        "ignored vertex colours (2, first in line 2)",
         "ignored points and lines (line 15): `p`, `l`",
         "ignored `cstype` (line 16)",
         "ignored smoothing groups `s` (line 7): where faces have no normals",
@@ -221,8 +220,8 @@ fn everything_that_an_obj_file_loses_is_named_once() {
         "ignored colour and strength of `Ks` (material `paint`): Fresnel's equations give the \
          gloss of plastic",
         "ignored materials that no library describes (`lost`, line 13): they are white",
-        "ignored faces without a material (the first faces): grey, 0.5; in a `.toml` \
-         scene an error",
+        "ignored vertex colours of faces with a material (all vertices): for those without, and \
+         materials with `vertex_color`; sRGB",
     ];
     assert!(scene.warnings[0].contains("a.png: "), "{:#?}", scene.warnings);
     assert!(scene.warnings[0].contains("rendered without this texture (room.mtl:15)"));
@@ -238,9 +237,9 @@ fn everything_that_an_obj_file_loses_is_named_once() {
     let run = folder.run(&["render", "room.obj", "--strict", "-o", "room.exr"]);
     run.assert(
         1,
-        &["room.obj: --strict: 17 warnings:\n", "heights in `bump`, `map_bump` (material `leaf`"],
+        &["room.obj: --strict: 16 warnings:\n", "heights in `bump`, `map_bump` (material `leaf`"],
     );
-    folder.run(&["study", "room.obj", "--strict"]).assert(1, &["--strict: 17 warnings:"]);
+    folder.run(&["study", "room.obj", "--strict"]).assert(1, &["--strict: 16 warnings:"]);
     folder.run(&["info", "room.obj"]).assert(0, &[]);
 }
 

@@ -62,6 +62,19 @@ impl Folder {
              the file there and name it relative to the scene, or allow its folder by --allow-root"
         ))
     }
+
+    /// As [`Folder::file_within`]; for a file that is not there, one of its name in another case, or one that
+    /// lies beside the scene without the folders of its name.
+    pub(crate) fn found_within(&self, within: &Path, name: &str) -> Result<PathBuf, String> {
+        let found = self.file_within(within, name);
+        if found.as_ref().is_ok_and(|path| path.exists()) {
+            return found;
+        }
+        let alone = self.file_within(within, name.rsplit(['/', '\\']).next().unwrap_or_default());
+        let others = [found.as_ref().ok(), alone.as_ref().ok()].into_iter().flatten();
+        let other = others.filter_map(|path| in_another_case(path)).find(|path| path.is_file());
+        other.map_or(found, Ok)
+    }
 }
 
 /// Takes `..` and the folder before it out of a path; those that lead out of it stay in front.

@@ -36,6 +36,7 @@ features! {
     GLTF_MORPH_ANIMATION "animated weights of morph targets" "those of the file count";
     GLTF_POINTS "points and lines" "";
     GLTF_SCENES "further scenes" "the default scene is rendered, else the first";
+    GLTF_LIGHT_TYPE "lights of other types" "";
     GLTF_LIGHT_RANGE "range of lights" "light falls off with the squared distance alone";
     GLTF_OBJECT_LIGHTS "lights of a file in a `.toml` scene" "";
     GLTF_UNLIT_COLOR "vertex colours of unlit materials" "";
@@ -61,11 +62,13 @@ features! {
 features! {
     /// Statements of OBJ files.
     OBJ;
-    OBJ_COLOR "vertex colours" "";
+    OBJ_COLOR "vertex colours of faces with a material" "for those without, and materials with `vertex_color`; sRGB";
     OBJ_SMOOTHING "smoothing groups `s`" "where faces have no normals";
     OBJ_POINTS "points and lines" "`p`, `l`";
     OBJ_UNDESCRIBED "materials that no library describes" "they are white";
     OBJ_NO_MATERIAL "faces without a material" "grey, 0.5; in a `.toml` scene an error";
+    OBJ_FACE "faces of fewer than three corners" "";
+    OBJ_INDEX "indices of texture coordinates and normals that are not there" "the corner has none";
     OBJ_STATEMENT "other statements, by name" "curves and surfaces among them";
 }
 
@@ -78,6 +81,7 @@ features! {
     MTL_BUMP "heights in `bump`, `map_bump`" "their unit is open";
     MTL_KA "`Ka` other than black" "";
     MTL_TF "`Tf` other than white" "of all but thin panes";
+    MTL_TRANSPARENT "`Tr 1` without `d`" "opaque";
     MTL_OUTSIDE "images whose names are absolute or lead out of the folder of the scene"
         "rendered without";
     MTL_KEY "other keys, by name" "`map_Ks`, `refl` and `Pc` among them";
@@ -87,6 +91,8 @@ features! {
     /// Parts of PLY files.
     PLY;
     PLY_COLOR "vertex colours of other materials" "";
+    PLY_FACE "colours and texture numbers of faces" "";
+    PLY_HEADER "other lines of the header" "";
 }
 
 features! {
@@ -129,6 +135,7 @@ features! {
     PBRT_PORTAL "`portal` of lights" "they hide nothing";
     PBRT_EMISSION_IMAGE "images of bilinear patches that emit" "their area light counts";
     PBRT_INSTANCE_LIGHT "area lights in objects" "dark, as in pbrt";
+    PBRT_INVISIBLE_LIGHT "area lights whose `alpha` is 0" "seen, and black to other light";
     PBRT_INTERFACE_LIGHT "area lights without a surface" "left out, as in pbrt";
     PBRT_PARAMETER "other parameters, by name" "";
 }
@@ -178,7 +185,7 @@ features! {
 }
 
 /// Extensions of glTF that are read.
-pub const GLTF_EXTENSIONS: [&str; 15] = [
+pub const GLTF_EXTENSIONS: [&str; 16] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
@@ -193,6 +200,7 @@ pub const GLTF_EXTENSIONS: [&str; 15] = [
     "KHR_materials_unlit",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_node_visibility",
     "KHR_texture_transform",
 ];
 

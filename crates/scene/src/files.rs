@@ -1,9 +1,10 @@
 //! Reading and atomic writing of files, and the user's cache folder.
 
 use std::{
+    borrow::Cow,
     env,
     fs::{self, File, FileType, OpenOptions},
-    io::{self, BufReader, BufWriter, Read, Write},
+    io::{self, BufRead, BufReader, BufWriter, Read, Write},
     path::{Path, PathBuf},
     process,
     time::Duration,
@@ -67,12 +68,25 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     read.map(|_| bytes).map_err(|source| Error::io(path, "read", source))
 }
 
+/// Mark before text of UTF-8, as programs on Windows write it.
+pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// Reads a file of UTF-8 text; an error names the first byte that is not.
 pub fn read_text(path: &Path) -> Result<String> {
-    String::from_utf8(read(path)?).map_err(|error| {
+    let mut bytes = read(path)?;
+    if bytes.starts_with(BYTE_ORDER_MARK) {
+        bytes.drain(..BYTE_ORDER_MARK.len());
+    }
+    String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         Error::format(path, format!("not a text file: byte {offset} is not UTF-8"))
     })
+}
+
+/// Text in UTF-8, else in Latin-1, in which other bytes are other characters.
+pub(crate) fn decoded(bytes: &[u8]) -> Cow<'_, str> {
+    let latin_1 = || bytes.iter().map(|byte| char::from(*byte)).collect();
+    std::str::from_utf8(bytes).map_or_else(|_| Cow::Owned(latin_1()), Cow::Borrowed)
 }
 
 /// Returns the folder that holds `path`.
@@ -232,8 +246,8 @@ pub(crate) fn open_regular(path: &Path) -> Result<File> {
     File::open(path).map_err(io_error)
 }
 
-/// Opens a regular file for reading, decompressed by gzip if its extension is `gz`; returns the most bytes
-/// that it may hold too.
+/// Opens a regular file for reading after its byte order mark, decompressed by gzip if its extension is
+/// `gz`; returns the most bytes that it may hold too.
 pub(crate) fn open_unpacked(path: &Path) -> Result<(BufReader<Box<dyn Read>>, u64)> {
     let file = open_regular(path)?;
     let bytes = file.metadata().map_err(|source| Error::io(path, "read", source))?.len();
@@ -241,7 +255,12 @@ pub(crate) fn open_unpacked(path: &Path) -> Result<(BufReader<Box<dyn Read>>, u6
         "gz" => (Box::new(MultiGzDecoder::new(file)), bytes.saturating_mul(DEFLATE_LARGEST_RATIO)),
         _ => (Box::new(file), bytes),
     };
-    Ok((BufReader::with_capacity(1 << 16, reader), bytes))
+    let mut reader = BufReader::with_capacity(1 << 16, reader);
+    // What cannot be read fails where it is read.
+    if reader.fill_buf().is_ok_and(|start| start.starts_with(BYTE_ORDER_MARK)) {
+        reader.consume(BYTE_ORDER_MARK.len());
+    }
+    Ok((reader, bytes))
 }
 
 /// Opens a device or standard stream for writing.

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
+use std::f32::consts::FRAC_PI_2;
+
 use fenestra_scene::{
     Scene,
     lamp::{LampKind, SpotFalloff},
@@ -697,14 +699,146 @@ fn lights_of_nodes_become_lamps() {
     assert_ne!(Scene::load(&folder.write("b.gltf", other)).unwrap().hash, scene.hash);
     for (from, to, expected) in [
         ("\"light\": 2", "\"light\": 3", "node 3: the file has no light 3"),
-        ("Angle\": 0.1", "Angle\": 0.9", "0 ≤ innerConeAngle < outerConeAngle ≤ π/2, found 0.9"),
-        ("\"directional\"", "\"moon\"", "node 3: expected a light of type point"),
         ("\"intensity\": 2", "\"intensity\": -2", "node 2: expected a light of finite colour"),
     ] {
         let path = folder.write("b.gltf", text.replace(from, to));
         let message = Scene::load(&path).unwrap_err().to_string();
         assert!(message.contains(expected), "expected {expected:?}, found {message}");
     }
+}
+
+/// three.js and Blender write equal angles for a sharp edge.
+#[test]
+fn lights_of_others_do_not_end_the_file() {
+    let light = r#""extensions": {"KHR_lights_punctual": {"light": 0}}"#;
+    let lamp = |lamp: &str| {
+        let rest = format!(r#", "extensions": {{"KHR_lights_punctual": {{"lights": [{lamp}]}}}}"#);
+        let text = gltf(&format!(r#"{{"mesh": 0, {light}}}"#), "", "", &rest);
+        Scene::load(&Folder::new().write("a.gltf", text)).unwrap()
+    };
+    for (inner, outer, expected) in [(0.9, 0.9, 0.9), (0.5, 9.0, FRAC_PI_2), (0.9, 0.2, 0.2)] {
+        let angles = format!(r#"{{"innerConeAngle": {inner}, "outerConeAngle": {outer}}}"#);
+        let scene = lamp(&format!(r#"{{"type": "spot", "spot": {angles}}}"#));
+        let LampKind::Spot(spot) = scene.lamps[0].kind else { panic!() };
+        assert_eq!(spot.outer_angle_rad, expected);
+        assert_eq!(spot.inner_angle_rad, f32::min(inner, 0.999 * expected));
+    }
+    let scene = lamp(r#"{"type": "ambient"}"#);
+    assert!(scene.lamps.is_empty());
+    assert!(scene.warnings[0].contains("ignored lights of type \"ambient\" (node 0)"), "{scene:?}");
+}
+
+/// Documents as Blender, three.js, trimesh and others write them.
+#[test]
+fn what_the_format_leaves_open_is_completed() {
+    let folder = Folder::new();
+    let load = |text: &str| Scene::load(&folder.write("a.gltf", text)).unwrap();
+    let whole = gltf(r#"{"mesh": 0}"#, "", "", "");
+    let triangle = |scene: &Scene| scene.geometry.triangles.len() == 1;
+    assert!(triangle(&load(&format!("\u{feff}{whole}"))));
+    // An empty scene, null, and a channel that moves another part than a node.
+    let one = r#""scenes": [{"nodes": [0]}]"#;
+    let animation = r#""scenes": [{"nodes": [0]}, {}], "animations": [{"name": null, "channels":
+        [{"sampler": 0, "target": {"path": "pointer"}}], "samplers": [{"input": 0, "output": 0}]}]"#;
+    assert!(triangle(&load(&whole.replace(one, animation))));
+    // Without scenes all nodes stand.
+    let without = whole.replace(&format!("{one}, "), "");
+    assert!(!without.contains("scenes") && triangle(&load(&without)));
+    let without = whole.replace(r#""min": [0, 0, 0], "max": [1, 1, 0]"#, r#""name": "corners""#);
+    assert!(!without.contains("min") && triangle(&load(&without)));
+    let zeros = whole.replace(
+        r#"{"bufferView": 1, "componentType": 5126, "count": 1"#,
+        r#"{"componentType": 5126, "count": 3"#,
+    );
+    let zeros = zeros.replace(r#""POSITION": 0"#, r#""POSITION": 0, "NORMAL": 1"#);
+    assert_eq!(load(&zeros).geometry.normals, [[0.0; 3]; 3]);
+    let hidden = r#"{"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": false}}}"#;
+    let hidden = gltf(&format!(r#"{{"mesh": 0}}, {hidden}"#), "", "", "");
+    let hidden = load(&hidden.replace(one, r#""scenes": [{"nodes": [0, 1]}]"#));
+    assert!(triangle(&hidden));
+    assert!(hidden.warnings.iter().all(|text| !text.contains("ignored")), "{:?}", hidden.warnings);
+    let idle = r#"{"extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 0},
+        "KHR_materials_sheen": {"sheenColorFactor": [0, 0, 0]}, "KHR_materials_dispersion": {}}}"#;
+    let (_, warnings) = gltf_material(&folder, idle, "");
+    assert!(warnings.iter().all(|text| !text.contains("ignored")), "{warnings:?}");
+}
+
+#[test]
+fn colours_of_vertices_without_a_material_are_seen() {
+    let folder = Folder::new();
+    let text = "v 0 0 0 1 0 0\nv 1 0 0 0 0.5 0\nv 0 1 0\nf 1 2 3\n";
+    for (text, most) in [
+        (text, 1.0),
+        (&text.replace("0.5", "127.5").replace(" 1 0 0\nv 1", " 255 0 0\nv 1"), 255.0),
+    ] {
+        let scene = Scene::load(&folder.write("a.obj", text)).unwrap();
+        let [r, g, b] = &scene.geometry.colors[..] else { panic!("{most}") };
+        assert_eq!((*r, *b), ([1.0, 0.0, 0.0, 1.0], [1.0; 4]));
+        // Value of the transfer function of IEC 61966-2-1.
+        assert!((g[1] - 0.214_041).abs() < 1e-5 && g[0] == 0.0, "{g:?}");
+        assert!(scene.materials[0].surface.vertex_color);
+        assert!(
+            scene.warnings.iter().all(|text| !text.contains("ignored")),
+            "{:?}",
+            scene.warnings
+        );
+    }
+    let colors = Attribute::floats("COLOR_0", "VEC3", &[0.5; 9]);
+    let text = gltf_of(&[positions(), colors], 3, "", "");
+    let scene = Scene::load(&folder.write("a.gltf", text)).unwrap();
+    assert!(scene.materials[0].surface.vertex_color);
+    assert_eq!(scene.geometry.colors, [[0.5, 0.5, 0.5, 1.0]; 3]);
+    let text = "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let painted = "usemtl a\n".to_owned() + text;
+    let scene = Scene::load(&folder.write("a.obj", painted)).unwrap();
+    assert!(!scene.materials[0].surface.vertex_color);
+    assert!(scene.warnings[1].contains("ignored vertex colours of faces"), "{:?}", scene.warnings);
+}
+
+/// Files of Blender, 3ds Max, VTK, and of programs on old Macs and on Windows.
+#[test]
+fn obj_files_of_others_are_read() {
+    let folder = Folder::new();
+    let reflectances = |obj: &[u8], mtl: &[u8]| {
+        folder.write("A.mtl", mtl);
+        let scene = Scene::load(&folder.write("a.obj", obj)).unwrap();
+        let of = |index: &u32| match scene.materials[*index as usize].kind {
+            MaterialKind::Diffuse { reflectance } => reflectance.x,
+            _ => panic!("{scene:?}"),
+        };
+        (scene.geometry.materials.iter().map(of).collect::<Vec<_>>(), scene.warnings)
+    };
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\n";
+    let faces = "usemtl Mat #1 # wood\nf 1 2 3#\nusemtl Mat #2\nf 4 5 6\n";
+    let library =
+        "newmtl Mat #1\nKd 0.1 0 0\nPc 0\naniso 0\nNEWMTL Mat #2 # red\nKd 0.2 0 0 # dark\n";
+    let text = format!("mtllib a.MTL\n{corners}{faces}");
+    let (found, warnings) = reflectances(text.as_bytes(), library.as_bytes());
+    assert_eq!(found, [0.1, 0.2]);
+    assert!(warnings.iter().all(|text| !text.contains("ignored")), "{warnings:?}");
+    // The library may come last, lines end in one character, and the first begins with a mark.
+    let late = format!("\u{feff}{corners}{faces}mtllib \"C:\\me\\A.mtl\"").replace('\n', "\r");
+    assert_eq!(
+        reflectances(late.as_bytes(), format!("\u{feff}{library}").as_bytes()).0,
+        [0.1, 0.2]
+    );
+    let latin = |text: &str| -> Vec<u8> { text.chars().map(|c| c as u8).collect() };
+    let text = text.replace("Mat #1", "gr\u{fc}n").replace("Mat #2", "gr\u{e4}n");
+    let names = library.replace("Mat #1", "gr\u{fc}n").replace("Mat #2", "gr\u{e4}n");
+    assert_eq!(reflectances(&latin(&text), &latin(&names)).0, [0.1, 0.2]);
+    // A comment goes on in no other line, and what is no number or no face is left out.
+    let odd = format!("# a \\\n{corners}v -nan(ind) 0 0\nf 1 2\nf 1/9 2/0 3//7\n");
+    let (found, warnings) = reflectances(odd.as_bytes(), b"");
+    assert_eq!(found, [0.5]);
+    for expected in [
+        "faces of fewer than three corners (line 9)",
+        "texture coordinates that are not there (2, first in line 10)",
+    ] {
+        assert!(warnings.iter().any(|text| text.contains(expected)), "{expected}: {warnings:?}");
+    }
+    let wide: Vec<u8> = "v 0 0 0\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let path = folder.write("a.obj", [&b"\xff\xfe"[..], &wide].concat());
+    assert!(Scene::load(&path).unwrap_err().to_string().contains("found UTF-16: save it as UTF-8"));
 }
 
 /// Loads an OBJ triangle with the only material of a library.
@@ -740,6 +874,9 @@ fn mtl_materials_become_surfaces() {
     let opacity = mtl_material(&folder, keys).0.surface.opacity;
     let texture = opacity.texture.unwrap();
     assert_eq!((opacity.factor, texture.channels), (0.25, Channels::Green));
+    let (found, warnings) = mtl_material(&folder, "Tr 1");
+    assert!(found.surface.opacity.factor == 1.0 && warnings[0].contains("`Tr 1`"), "{warnings:?}");
+    assert_eq!(mtl_material(&folder, "d 0\nTr 1").0.surface.opacity.factor, 0.0);
     assert_eq!((texture.scale, texture.bias), ([0.5; 3], [0.2; 3]));
 
     let kind = |keys: &str| mtl_material(&folder, keys).0.kind;
@@ -780,7 +917,8 @@ fn options_of_images_stand_before_names_with_spaces() {
     for name in ["my oak.png", "oak.png", "-oak.png", "2.png"] {
         folder.write(name, png([[128, 128, 255, 255]; 2]));
     }
-    let options = "-s 2 3 1 -o 0.5 -clamp on -bm 0.3 -blendu off -mm 0.1 0.8 -imfchan g";
+    let options =
+        "-s 2 3 1 -o 0.5 -clamp on -bm 0.3 -blendu off -blendv on -cc off -mm 0.1 0.8 -imfchan g";
     let (found, warnings) = mtl_material(&folder, &format!("norm {options} my oak.png"));
     assert!(warnings.len() == 1 && warnings[0].contains("option `-blendu`"), "{warnings:?}");
     let normal = found.surface.normal.unwrap();
@@ -888,7 +1026,14 @@ fn extras_may_be_anything() {
 
 #[test]
 fn ply_coordinates_and_colours_are_read() {
-    let names = [("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t")];
+    let names = [
+        ("u", "v"),
+        ("s", "t"),
+        ("texture_u", "texture_v"),
+        ("texture_s", "texture_t"),
+        ("s0", "t0"),
+        ("tu", "tv"),
+    ];
     let folder = Folder::new();
     for (u, v) in names {
         let text = format!(
@@ -906,6 +1051,28 @@ fn ply_coordinates_and_colours_are_read() {
         // 48316 of 65535 is 188 of 255.
         assert!((r, g, a) == (1.0, b, 1.0) && (b - 0.5029).abs() < 1e-3, "{g} {b}");
     }
+    // MeshLab gives corners coordinates, and Blender 2.47 forgot to mark a comment.
+    let text = "ply\nformat ascii 1.0\nMade by Blender\nelement vertex 4\nproperty float x\n\
+        property float y\nproperty float z\nproperty uchar diffuse_red\nproperty uchar diffuse_green\n\
+        property uchar diffuse_blue\nelement face 2\nproperty list uchar int vertex_indices\n\
+        property list uchar float texcoord\nproperty int texnumber\nend_header\n\
+        0 0 0 255 0 0\n1 0 0 0 0 0\n0 1 0 0 0 0\n1 1 0 0 0 0\n\
+        3 0 1 2 6 0 0 1 0 0 1 0\n3 1 3 2 6 0.5 0.5 1 1 0 1 0\n";
+    let mut warnings = Vec::new();
+    let mesh = Mesh::read(&folder.write("b.ply", text), &mut warnings).unwrap();
+    // Both triangles share the corner whose coordinates agree.
+    assert_eq!(mesh.triangles, [[0, 1, 2], [4, 3, 2]]);
+    assert_eq!(mesh.positions[4], mesh.positions[1]);
+    assert_eq!(mesh.uvs[0], [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.5, 0.5]]);
+    assert_eq!((mesh.colors[0], mesh.colors.len()), ([1.0, 0.0, 0.0, 1.0], 5));
+    let [header, number] = &warnings[..] else { panic!("{warnings:?}") };
+    assert!(header.contains("other lines of the header (`Made by Blender`)"), "{header}");
+    assert!(number.contains("ignored `texnumber` of faces"), "{number}");
+    let strips = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+        property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n\
+        0 0 0\n1 0 0\n0 1 0\n1 1 0\n8 0 1 2 3 -1 3 2 1\n";
+    let mesh = Mesh::read(&folder.write("c.ply", strips), &mut Vec::new()).unwrap();
+    assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 3], [3, 2, 1]]);
     let clay = "type = \"diffuse\"\nreflectance = [1, 1, 1]";
     let toml = |clay: &str| folder::yard([8, 8], "constant = [1, 1, 1]", clay, "mesh = \"a.ply\"");
     let plain = Scene::load(&folder.write("a.toml", toml(clay))).unwrap();

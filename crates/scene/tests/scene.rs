@@ -1195,7 +1195,10 @@ fn broken_ply_files_are_refused_with_their_place() {
         &set("1 1 0", &format!("{} 1 0", "1".repeat(65))),
         "broken.ply:12:1: vertex 2 of 4: expected a number, found a long word",
     );
-    case(&set("element face", "element tristrips"), "expected one element `face`, found 0");
+    case(
+        &set("element face", "element edge"),
+        "expected one element `face` or `tristrips`, found 0",
+    );
     let binary = binary_ply(false);
     case(&binary[..binary.len() - 1], "truncated: the file ends in face 1 of 2");
     case(&binary[..binary.len() - 40], "truncated: ");
@@ -1259,12 +1262,6 @@ fn broken_obj_files_are_refused_with_their_line() {
     );
     case("f 1 2 3", "f 0 1 2", "position index 0 is out of range");
     case("f 1 2 3", "f -4 1 2", "position index -4 is out of range");
-    case(
-        "f 1 2 3",
-        "f 1//1 2//1 3//1",
-        "normal index 1 is out of range, there are 0 normals so far",
-    );
-    case("f 1 2 3", "f 1 2", "broken.obj:4:1: a face needs three corners or more, found 2");
     case("f 1 2 3", "f 1 2 x", "expected the index of a position, found `x`");
     case("f 1 2 3", "f 1 2 99999999999999999999", "expected the index of a position");
     case("v 1 0 0", "v 1 zero 0", "broken.obj:2:1: expected three numbers, found `zero`");
@@ -1375,7 +1372,6 @@ fn broken_gltf_files_are_refused() {
         "\"extensionsRequired\": [\"EXT_unknown\"], \"asset\"",
         "the file requires the extension `EXT_unknown`, which is not supported: export it without",
     );
-    case("\"scene\": 0, \"scenes\": [{\"nodes\": [0]}],", "", "expected a scene with nodes");
     let mut bytes = gltf_buffer();
     bytes[74] = 9;
     folder.write("buffer.bin", bytes);

@@ -6,7 +6,7 @@ use std::path::Path;
 use fenestra_scene::{
     Scene,
     export::gltf,
-    features::{Ignored, OBJ_COLOR, OBJ_STATEMENT},
+    features::{Ignored, OBJ_POINTS, OBJ_STATEMENT},
     memory::{check, check_count, limit, parse_size, room, size},
 };
 
@@ -16,11 +16,14 @@ use crate::support::folder::Folder;
 fn a_kind_is_one_warning_and_kinds_are_bounded() {
     let mut ignored = Ignored::default();
     for line in 1..=3 {
-        ignored.add(OBJ_COLOR, || format!("line {line}"));
+        ignored.add(OBJ_POINTS, || format!("line {line}"));
     }
     ignored.add_named(OBJ_STATEMENT, "`deg`", || "line\n4".to_owned());
     let path = Path::new("a.obj");
-    assert_eq!(ignored.warnings(path)[0], "a.obj: ignored vertex colours (3, first in line 1)");
+    assert_eq!(
+        ignored.warnings(path)[0],
+        "a.obj: ignored points and lines (3, first in line 1): `p`, `l`"
+    );
     assert_eq!(ignored.warnings(path)[1], "a.obj: ignored `deg` (line?4)");
     for number in 0..1000 {
         ignored.add_named(OBJ_STATEMENT, &format!("`x{number}`"), || "line 5".to_owned());

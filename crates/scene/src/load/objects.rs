@@ -93,9 +93,16 @@ impl Loader<'_> {
                         scene.inputs.push(key.clone());
                         scene.inputs.extend_from_slice(&mesh.side_files);
                         let mut ignored = ignored_in_object(&mesh, own_materials.contains(key));
-                        let is_ply = crate::files::extension(key) == "ply";
-                        if is_ply && !mesh.colors.is_empty() && !colored.contains(key) {
-                            ignored.add(features::PLY_COLOR, || "element `vertex`".to_owned());
+                        let feature = match crate::files::extension(key).as_str() {
+                            "ply" => Some(features::PLY_COLOR),
+                            "obj" => Some(features::OBJ_COLOR),
+                            _ => None,
+                        };
+                        if let Some(feature) = feature
+                            && !mesh.colors.is_empty()
+                            && !colored.contains(key)
+                        {
+                            ignored.add(feature, || "all vertices".to_owned());
                             mesh.colors.clear();
                         }
                         warnings.extend(ignored.warnings(key));

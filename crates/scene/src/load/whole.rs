@@ -121,14 +121,24 @@ impl Loader<'_> {
             || mesh.repeated.iter().any(|repeated| repeated.material.is_none())
         {
             // An OBJ file leaves the material open; glTF defines the one that is meant.
-            materials.push(if files::extension(self.path) == "obj" {
+            let is_colored = !mesh.colors.is_empty()
+                || mesh.repeated.iter().any(|repeated| !repeated.mesh.colors.is_empty());
+            let mut default = if files::extension(self.path) != "obj" {
+                Material::new("default", MaterialKind::Principled(Principled::default()))
+            } else if is_colored {
+                Material::new("default", MaterialKind::Diffuse { reflectance: Vec3::ONE })
+            } else {
                 if !mesh.triangles.is_empty() {
                     ignored.add(features::OBJ_NO_MATERIAL, || "the first faces".to_owned());
                 }
                 default_material()
-            } else {
-                Material::new("default", MaterialKind::Principled(Principled::default()))
-            });
+            };
+            default.surface.vertex_color = is_colored;
+            materials.push(default);
+        }
+        let has_material = mesh.runs.iter().any(|run| run.material.is_some());
+        if files::extension(self.path) == "obj" && !mesh.colors.is_empty() && has_material {
+            ignored.add(features::OBJ_COLOR, || "all vertices".to_owned());
         }
         let mut geometry = Geometry::default();
         let transform = Transform::new([1.0; 3], [0.0; 3], [0.0; 3]);

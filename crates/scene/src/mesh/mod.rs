@@ -146,6 +146,18 @@ pub struct MeshMaterial {
     pub is_culled: bool,
 }
 
+/// No corner, which ends a strip of triangles.
+const RESTART: u32 = u32::MAX;
+
+/// Triangles of a strip, all of the same side.
+fn strip_triangles(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
+    let turned = |(index, corners): (usize, &[u32])| match index % 2 {
+        0 => [corners[0], corners[1], corners[2]],
+        _ => [corners[1], corners[0], corners[2]],
+    };
+    corners.windows(3).enumerate().map(turned)
+}
+
 impl Mesh {
     /// Reads a mesh file; adds what it leaves out to `warnings`.
     ///
@@ -166,7 +178,7 @@ impl Mesh {
         warnings: &mut Vec<String>,
     ) -> Result<Self> {
         match files::extension(path).as_str() {
-            "ply" => ply::read(path),
+            "ply" => ply::read(path, warnings),
             "obj" => obj::read(path, warnings),
             "gltf" | "glb" => gltf::read(path, time, variant, budget, warnings),
             found => {
@@ -202,6 +214,13 @@ impl Mesh {
                 Err(format!("triangles: expected corners below {vertices}, found {corner}"))
             }
             None => Ok(()),
+        }
+    }
+
+    /// Adds the triangles of strips of corners; [`RESTART`] begins another strip.
+    fn push_strips(&mut self, corners: &[u32]) {
+        for strip in corners.split(|corner| *corner == RESTART) {
+            self.triangles.extend(strip_triangles(strip));
         }
     }
 

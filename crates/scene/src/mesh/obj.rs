@@ -7,7 +7,7 @@
 
 use std::{
     collections::HashMap,
-    io::{BufRead, BufReader},
+    io::BufRead,
     path::{Path, PathBuf},
 };
 
@@ -23,6 +23,7 @@ use crate::{
     features::{self, Ignored},
     files,
     material::{Material, MaterialKind},
+    math::colour::srgb_to_linear,
     memory,
     texture::TextureCache,
 };
@@ -33,52 +34,77 @@ const NONE: u32 = u32::MAX;
 /// Most vertices of a chain; further vertices of its position are found by hash.
 const LONGEST_CHAIN: usize = 16;
 
+/// Colour of a vertex without one, among others with.
+const WHITE: [f32; 3] = [1.0; 3];
+
 /// Reads an OBJ file and the material libraries beside it; a missing library is a warning.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Parse`] with the line.
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
-    let file = files::open_regular(path)?;
+    let (file, bytes) = files::open_unpacked(path)?;
     // The arrays of a mesh take about as much as its text.
-    memory::check(path.display(), file.metadata().map_or(0, |metadata| metadata.len()))
-        .map_err(Error::memory)?;
+    memory::check(path.display(), bytes).map_err(Error::memory)?;
     let mut reader = ObjReader { path: path.to_path_buf(), ..ObjReader::default() };
-    for_each_line(path, BufReader::with_capacity(1 << 16, file), |line, text| {
+    for_each_line(path, file, |line, text| {
         reader.line = line;
         reader.read_line(text, warnings)
     })?;
-    let (mut mesh, ignored) = reader.finish();
+    let (mut mesh, ignored) = reader.finish(warnings);
     warnings.extend(ignored.warnings(path));
     mesh.part_coincident(path, warnings);
     Ok(mesh)
 }
 
-/// Passes every line with its number from 1 to `use_line`; a trailing backslash continues the line.
+/// Passes every line with its number from 1 to `use_line`; a trailing backslash continues a line that is no
+/// comment. Lines end as on Unix, Windows or old Macs.
 fn for_each_line(
     path: &Path,
     mut reader: impl BufRead,
     mut use_line: impl FnMut(usize, &str) -> Result<()>,
 ) -> Result<()> {
-    let mut bytes = Vec::new();
-    let mut first_line = 1;
-    for next_line in 2.. {
-        let read = reader
-            .read_until(b'\n', &mut bytes)
-            .map_err(|source| Error::io(path, "read", source))?;
-        while matches!(bytes.last(), Some(b'\n' | b'\r')) {
-            bytes.pop();
+    let (mut bytes, mut statement) = (Vec::new(), Vec::new());
+    let (mut line, mut first_line) = (0, 1);
+    loop {
+        bytes.clear();
+        let read = reader.read_until(b'\n', &mut bytes);
+        if read.map_err(|source| Error::io(path, "read", source))? == 0 {
+            return use_line(first_line, &files::decoded(&statement));
         }
-        match bytes.last_mut() {
-            Some(last) if read > 0 && *last == b'\\' => *last = b' ',
-            None if read == 0 => break,
-            _ => {
-                use_line(first_line, &String::from_utf8_lossy(&bytes))?;
-                bytes.clear();
-                first_line = next_line;
+        if line == 0 && (bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff")) {
+            return Err(Error::parse(path, 1, 1, "expected UTF-8, found UTF-16: save it as UTF-8"));
+        }
+        let ended = bytes.trim_ascii_end();
+        for part in ended.split(|byte| *byte == b'\r') {
+            line += 1;
+            statement.extend_from_slice(part);
+            match statement.last_mut() {
+                Some(last) if *last == b'\\' && !part.starts_with(b"#") => *last = b' ',
+                _ => {
+                    use_line(first_line, &files::decoded(&statement))?;
+                    statement.clear();
+                    first_line = line + 1;
+                }
             }
         }
     }
-    Ok(())
+}
+
+/// Keyword and rest of a statement without its comment. Names may hold a `#`: theirs is one that stands alone.
+pub(super) fn statement(text: &str) -> (&str, &str) {
+    let text = text.trim();
+    let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    if keyword.starts_with('#') {
+        return ("", "");
+    }
+    let key = keyword.to_ascii_lowercase();
+    let has_name = matches!(&*key, "o" | "g" | "usemtl" | "mtllib" | "newmtl" | "bump" | "norm")
+        || key.starts_with("map_");
+    let comment = match rest.strip_suffix(" #") {
+        Some(name) if has_name => Some(name.len()),
+        _ => rest.find(if has_name { " # " } else { "#" }),
+    };
+    (keyword, rest[..comment.unwrap_or(rest.len())].trim())
 }
 
 /// Position, texture coordinates and normal that a face uses together, linked to the next of the same
@@ -95,6 +121,8 @@ struct ObjReader {
     path: PathBuf,
     line: usize,
     positions: Vec<[f32; 3]>,
+    /// Colours of positions as they stand; white where only others have one.
+    colors: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
     /// As long as `mesh.positions`.
@@ -106,6 +134,8 @@ struct ObjReader {
     mesh: Mesh,
     /// Index into `mesh.materials` by name.
     material_indices: HashMap<String, usize>,
+    /// Names by that index, and the lines of their first use.
+    material_names: Vec<(String, usize)>,
     /// The last material of each name in the libraries.
     library: HashMap<String, LibraryMaterial>,
     images: TextureCache,
@@ -119,13 +149,14 @@ impl ObjReader {
     }
 
     fn read_line(&mut self, text: &str, warnings: &mut Vec<String>) -> Result<()> {
-        let text = text.split('#').next().unwrap_or_default().trim();
-        let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+        let (keyword, rest) = statement(text);
         match keyword {
             "v" => {
                 let position = self.vector(rest, 3)?;
                 if rest.split_ascii_whitespace().nth(5).is_some() {
-                    self.ignore(features::OBJ_COLOR, features::OBJ_COLOR.name);
+                    let [_, _, _, r, g, b] = self.vector(rest, 3)?;
+                    self.colors.resize(self.positions.len(), WHITE);
+                    self.colors.push([r, g, b]);
                 }
                 self.positions.push(position);
                 self.chains.push(NONE);
@@ -140,13 +171,17 @@ impl ObjReader {
             }
             "f" => self.read_face(rest)?,
             "usemtl" => {
-                let material = self.material_index(rest.trim(), warnings);
+                let next = self.material_names.len();
+                let material = *self.material_indices.entry(rest.to_owned()).or_insert(next);
+                if material == next {
+                    self.material_names.push((rest.to_owned(), self.line));
+                }
                 self.mesh.start_run(Some(material));
             }
-            "mtllib" => self.read_library(rest.trim(), warnings)?,
+            "mtllib" => self.read_library(rest, warnings)?,
             "" => {}
-            "o" | "g" => self.mesh.start_object(rest.trim()),
-            "s" if matches!(rest.trim(), "off" | "0") => {}
+            "o" | "g" => self.mesh.start_object(rest),
+            "s" if matches!(rest, "off" | "0") => {}
             "s" => self.first_smoothing = self.first_smoothing.or(Some(self.line)),
             "p" | "l" => self.ignore(features::OBJ_POINTS, features::OBJ_POINTS.name),
             _ => self.ignore(features::OBJ_STATEMENT, &format!("`{keyword}`")),
@@ -168,9 +203,11 @@ impl ObjReader {
                 word => word.unwrap_or_default(),
             };
             let expected = if least == 3 { "three numbers" } else { "one number or two" };
-            *component = word
-                .parse()
-                .map_err(|_| self.error(format!("expected {expected}, found `{word}`")))?;
+            // C libraries print what is no number in many ways.
+            let is_none = word.trim_start_matches('-').starts_with("nan(");
+            let number = word.parse().ok().or(is_none.then_some(f32::NAN));
+            *component =
+                number.ok_or_else(|| self.error(format!("expected {expected}, found `{word}`")))?;
         }
         Ok(vector)
     }
@@ -179,11 +216,7 @@ impl ObjReader {
         let words = words.split_ascii_whitespace();
         let corners: Vec<u32> = words.map(|word| self.corner(word)).collect::<Result<_>>()?;
         match corners[..] {
-            [] | [_] | [_, _] => {
-                let count = corners.len();
-                let message = format!("a face needs three corners or more, found {count}");
-                return Err(self.error(message));
-            }
+            [] | [_] | [_, _] => self.ignore(features::OBJ_FACE, features::OBJ_FACE.name),
             [a, b, c] => self.mesh.triangles.push([a, b, c]),
             _ => self.mesh.push_polygon(&corners),
         }
@@ -195,12 +228,9 @@ impl ObjReader {
         let mut parts = word.split('/');
         let position = parts.next().unwrap_or_default();
         let position = self.index(position, self.positions.len(), "position")?;
-        let mut index = |count, what| match parts.next() {
-            Some(word) if !word.is_empty() => self.index(word, count, what),
-            _ => Ok(NONE),
-        };
-        let uv = index(self.uvs.len(), "texture coordinate")?;
-        let normal = index(self.normals.len(), "normal")?;
+        let (uv, normal) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
+        let uv = self.attribute(uv, self.uvs.len(), "texture coordinate");
+        let normal = self.attribute(normal, self.normals.len(), "normal");
         let mut vertex = self.chains[position as usize];
         let mut chain_length = 0;
         while vertex != NONE {
@@ -226,8 +256,23 @@ impl ObjReader {
             std::mem::replace(&mut self.chains[position as usize], vertex)
         };
         self.vertices.push(Vertex { uv, normal, next });
+        if let Some([r, g, b]) = self.colors.get(position as usize) {
+            self.mesh.colors.resize(self.mesh.positions.len(), [1.0; 4]);
+            self.mesh.colors.push([*r, *g, *b, 1.0]);
+        }
         self.mesh.positions.push(self.positions[position as usize]);
         Ok(vertex)
+    }
+
+    /// Index of an attribute that a corner may have; none for one that the file does not have so far.
+    fn attribute(&mut self, word: &str, count: usize, what: &str) -> u32 {
+        if word.is_empty() {
+            return NONE;
+        }
+        self.index(word, count, what).unwrap_or_else(|_| {
+            self.ignore(features::OBJ_INDEX, &format!("indices of {what}s that are not there"));
+            NONE
+        })
     }
 
     /// Converts to an index from 0; the file counts from 1, or backwards from −1, the latest.
@@ -250,39 +295,33 @@ impl ObjReader {
         }
     }
 
-    /// Finds or adds a material by name; one that no library describes is white.
-    fn material_index(&mut self, name: &str, warnings: &mut Vec<String>) -> usize {
-        if let Some(&index) = self.material_indices.get(name) {
-            return index;
+    /// Material by its name; white if no library describes it.
+    fn material(&mut self, name: &str, line: usize, warnings: &mut Vec<String>) -> MeshMaterial {
+        if let Some(found) = self.library.get(name) {
+            return found.finish(&mut self.images, warnings);
         }
-        let material = if let Some(found) = self.library.get(name) {
-            found.finish(&mut self.images, warnings)
-        } else {
-            let mut ignored = Ignored::default();
-            ignored.add(features::OBJ_UNDESCRIBED, || format!("`{name}`, line {}", self.line));
-            let kind = MaterialKind::Diffuse { reflectance: Vec3::ONE };
-            MeshMaterial { material: Material::new(name, kind), ignored, is_culled: false }
-        };
-        let index = self.mesh.materials.len();
-        self.mesh.materials.push(material);
-        self.material_indices.insert(name.to_owned(), index);
-        index
+        let mut ignored = Ignored::default();
+        ignored.add(features::OBJ_UNDESCRIBED, || format!("`{name}`, line {line}"));
+        let kind = MaterialKind::Diffuse { reflectance: Vec3::ONE };
+        MeshMaterial { material: Material::new(name, kind), ignored, is_culled: false }
     }
 
     /// Reads MTL libraries; one line may name several files.
     fn read_library(&mut self, names: &str, warnings: &mut Vec<String>) -> Result<()> {
         let folder = Folder::of(&self.path);
-        let names = match folder.file(names) {
+        let names = names.trim_matches('"');
+        let find = |name: &str| folder.found_within(Path::new(""), name);
+        let names = match find(names) {
             Ok(whole) if whole.is_file() => vec![names],
             _ => names.split_ascii_whitespace().collect(),
         };
         for name in names {
-            let path = folder.file(name);
+            let path = find(name);
             if path.as_ref().is_ok_and(|path| self.mesh.side_files.contains(path)) {
                 continue;
             }
             let found = path.and_then(|path| {
-                let file = files::open_regular(&path).map_err(|error| error.to_string())?;
+                let (file, _) = files::open_unpacked(&path).map_err(|error| error.to_string())?;
                 Ok((path, file))
             });
             let (path, file) = match found {
@@ -299,14 +338,30 @@ impl ObjReader {
             };
             self.mesh.side_files.push(path.clone());
             let mut library = Library::new(&folder, &path);
-            for_each_line(&path, BufReader::new(file), |line, text| library.read_line(line, text))?;
+            for_each_line(&path, file, |line, text| {
+                library.read_line(line, text);
+                Ok(())
+            })?;
             let read = library.materials.into_iter().map(|found| (found.name.clone(), found));
             self.library.extend(read);
         }
         Ok(())
     }
 
-    fn finish(mut self) -> (Mesh, Ignored) {
+    fn finish(mut self, warnings: &mut Vec<String>) -> (Mesh, Ignored) {
+        for (name, line) in std::mem::take(&mut self.material_names) {
+            let material = self.material(&name, line, warnings);
+            self.mesh.materials.push(material);
+        }
+        if !self.mesh.colors.is_empty() {
+            self.mesh.colors.resize(self.mesh.positions.len(), [1.0; 4]);
+            let channels = || self.mesh.colors.iter().flatten();
+            let most = if channels().any(|channel| *channel > 1.0) { 255.0 } else { 1.0 };
+            for color in self.mesh.colors.iter_mut().filter(|color| **color != [1.0; 4]) {
+                let [r, g, b] = [0, 1, 2].map(|at| srgb_to_linear(color[at] / most));
+                *color = [r, g, b, 1.0];
+            }
+        }
         if let Some(line) = self.first_smoothing
             && self.vertices.iter().any(|vertex| vertex.normal == NONE)
         {

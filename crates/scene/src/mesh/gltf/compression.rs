@@ -33,6 +33,8 @@ use crate::{
 };
 
 const DRACO: &str = "KHR_draco_mesh_compression";
+/// Most bytes of an accessor without values.
+const MAX_ZERO_BYTES: u64 = 1 << 28;
 const MESHOPT: &str = "EXT_meshopt_compression";
 
 /// Tests for a buffer that holds what readers without the extension find in compressed views.
@@ -70,6 +72,7 @@ pub(super) fn expand(
             }
         }
     }
+    expansion.fill_with_zeros().map_err(error("accessors".to_owned()))?;
     Ok(expansion.root)
 }
 
@@ -119,6 +122,25 @@ impl Expansion<'_> {
         let length = bytes.len();
         let buffer = self.push(bytes)?.value();
         Ok(self.root.push(part(json!({"buffer": buffer, "byteLength": length}))?))
+    }
+
+    /// Gives accessors of neither a view nor sparse values the zeros that they stand for.
+    fn fill_with_zeros(&mut self) -> Result<(), String> {
+        for at in 0..self.root.accessors.len() {
+            let accessor = &self.root.accessors[at];
+            let (Checked::Valid(kind), Checked::Valid(dimensions)) =
+                (accessor.component_type, accessor.type_)
+            else {
+                continue;
+            };
+            let (count, size) = (accessor.count.0, kind.0.size() * dimensions.multiplicity());
+            let is_used = accessor.buffer_view.is_some() || accessor.sparse.is_some();
+            if !is_used && count.saturating_mul(size as u64) <= MAX_ZERO_BYTES {
+                let view = self.push_view(vec![0; count as usize * size])?;
+                self.root.accessors[at].buffer_view = Some(view);
+            }
+        }
+        Ok(())
     }
 
     /// Replaces what a buffer view shows by what its extension holds.

@@ -19,6 +19,24 @@ use crate::{
 const OTHER_PARTS: &str =
     "accessors animations bufferViews buffers cameras images samplers scenes skins textures";
 
+/// Factors whose default is 0, without which an extension changes nothing.
+const FACTORS: [(&str, &str); 5] = [
+    ("KHR_materials_anisotropy", "anisotropyStrength"),
+    ("KHR_materials_clearcoat", "clearcoatFactor"),
+    ("KHR_materials_dispersion", "dispersion"),
+    ("KHR_materials_iridescence", "iridescenceFactor"),
+    ("KHR_materials_sheen", "sheenColorFactor"),
+];
+
+/// Tests for an extension of strength 0, as exporters write it.
+fn is_idle(name: &str, extension: &Value) -> bool {
+    let factor = FACTORS.iter().find(|(own, _)| *own == name).map(|(_, key)| &extension[key]);
+    factor.is_some_and(|factor| match factor {
+        Value::Array(channels) => channels.iter().all(|channel| channel.as_f64() == Some(0.0)),
+        factor => factor.as_f64().unwrap_or(0.0) == 0.0,
+    })
+}
+
 /// Counts an extension, unless it is done.
 fn ignore_extension(ignored: &mut Ignored, extension: &str, place: impl FnOnce() -> String) {
     if features::GLTF_EXTENSIONS.contains(&extension) {
@@ -38,7 +56,9 @@ pub(super) fn ignore_extensions(ignored: &mut Ignored, part: &Value, place: &imp
             for (key, member) in members {
                 if key == "extensions" {
                     let extensions = member.as_object().into_iter().flatten();
-                    extensions.for_each(|(name, _)| ignore_extension(ignored, name, place));
+                    extensions
+                        .filter(|(name, extension)| !is_idle(name, extension))
+                        .for_each(|(name, _)| ignore_extension(ignored, name, place));
                 }
                 // Extras are free to hold anything.
                 if key != "extras" {

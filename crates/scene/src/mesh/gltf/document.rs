@@ -13,7 +13,7 @@ use gltf::{
     mesh::Semantic,
 };
 use percent_encoding::percent_decode_str;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::{compression, variants};
 use crate::{
@@ -44,6 +44,9 @@ pub(super) fn parse(
         .then(|| Glb::from_slice(bytes).map_err(|error| not_gltf(path, &error)));
     let glb = glb.transpose()?;
     let text = glb.as_ref().map_or(bytes, |glb| &glb.json);
+    let text = text.strip_prefix(files::BYTE_ORDER_MARK).unwrap_or(text);
+    // Some fill the chunk with zeros, where it ends in spaces.
+    let text = &text[..text.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1)];
     let mut json: Value = serde_json::from_slice(text).map_err(not_json)?;
     if let Some(version) = json["asset"]["version"].as_str()
         && version.split('.').next() != Some("2")
@@ -54,11 +57,11 @@ pub(super) fn parse(
     }
     let mut root: Root = match serde_json::from_slice(text) {
         Ok(root) => root,
-        // The crate takes extras for objects; they may be anything.
+        // The crate asks for more than the format does.
         Err(error) => {
-            let mut without = json.clone();
-            remove_extras(&mut without);
-            serde_json::from_value(without).map_err(|_| not_json(error))?
+            let mut completed = json.clone();
+            complete(&mut completed);
+            serde_json::from_value(completed).map_err(|_| not_json(error))?
         }
     };
     // Parsing checks against the extensions that the crate knows, not those that are known here.
@@ -78,6 +81,7 @@ pub(super) fn parse(
         primitive.attributes.retain(|name, _| matches!(name, Checked::Valid(_)));
     }
     check_positions(path, &root)?;
+    state_bounds(&mut root);
     if let Some(name) = variant {
         variants::choose(name, &mut json, &mut root)
             .map_err(|message| Error::format(path, message))?;
@@ -164,7 +168,9 @@ pub(super) fn beside(path: &Path, uri: &str) -> Result<PathBuf> {
     let name = percent_decode_str(uri)
         .decode_utf8()
         .map_err(|_| Error::format(path, format!("cannot read the file name `{uri}`")))?;
-    Folder::of(path).file(&name).map_err(|message| Error::format(path, message))
+    Folder::of(path)
+        .found_within(Path::new(""), &name)
+        .map_err(|message| Error::format(path, message))
 }
 
 /// Content of a URI that holds it; none if it names a file, and none inside if it is no base64.
@@ -173,14 +179,43 @@ pub(super) fn data_of(uri: &str) -> Option<Option<Vec<u8>>> {
     Some(data.split_once(";base64,").and_then(|(_, text)| BASE64.decode(text).ok()))
 }
 
-/// Removes the members `extras` of objects at any depth.
-fn remove_extras(value: &mut Value) {
-    match value {
-        Value::Object(members) => {
-            members.remove("extras");
-            members.values_mut().for_each(remove_extras);
+/// States the bounds of positions, which files leave out and nobody here reads, for the validation.
+fn state_bounds(root: &mut Root) {
+    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        if let Some(index) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) {
+            let accessor = &mut root.accessors[index.value()];
+            for bound in [&mut accessor.min, &mut accessor.max] {
+                bound.get_or_insert_with(|| json!([0.0, 0.0, 0.0]));
+            }
         }
-        Value::Array(elements) => elements.iter_mut().for_each(remove_extras),
-        _ => {}
+    }
+}
+
+/// Adds the nodes of empty scenes; removes extras, which may be anything and not objects alone, members that
+/// are null, and channels of animations that move no node.
+fn complete(json: &mut Value) {
+    fn clean(value: &mut Value) {
+        match value {
+            Value::Object(members) => {
+                members.retain(|key, member| key != "extras" && !member.is_null());
+                members.values_mut().for_each(clean);
+            }
+            Value::Array(elements) => elements.iter_mut().for_each(clean),
+            _ => {}
+        }
+    }
+    clean(json);
+    fn array<'a>(json: &'a mut Value, key: &str) -> Option<&'a mut Vec<Value>> {
+        json.get_mut(key)?.as_array_mut()
+    }
+    for scene in array(json, "scenes").into_iter().flatten() {
+        if let Some(members) = scene.as_object_mut() {
+            members.entry("nodes").or_insert_with(|| json!([]));
+        }
+    }
+    for animation in array(json, "animations").into_iter().flatten() {
+        if let Some(channels) = array(animation, "channels") {
+            channels.retain(|channel| !channel["target"]["node"].is_null());
+        }
     }
 }

@@ -18,6 +18,9 @@ use crate::{
     mesh::label,
 };
 
+/// Smallest angle from the axis of a spot to its edge.
+const SMALLEST_CONE_RAD: f32 = 1e-3;
+
 impl GltfReader<'_> {
     /// Adds the light of a node, which shines along −Z.
     pub(super) fn read_lamp(&mut self, node: &Node, world_from_node: Mat4) -> Result<()> {
@@ -42,31 +45,24 @@ impl GltfReader<'_> {
         let kind = match light["type"].as_str() {
             Some("point") => LampKind::Point { position, intensity },
             Some("spot") => {
-                let inner_angle_rad = number(&light["spot"], "innerConeAngle", 0.0);
-                let outer_angle_rad = number(&light["spot"], "outerConeAngle", FRAC_PI_4);
-                let is_cone = 0.0 <= inner_angle_rad
-                    && inner_angle_rad < outer_angle_rad
-                    && outer_angle_rad <= FRAC_PI_2 + 1e-6;
-                if !is_cone {
-                    return Err(error(format!(
-                        "expected the angles of a spot with 0 ≤ innerConeAngle < outerConeAngle ≤ \
-                         π/2, found {inner_angle_rad} and {outer_angle_rad}"
-                    )));
-                }
+                let outer = number(&light["spot"], "outerConeAngle", FRAC_PI_4);
+                let outer = outer.clamp(SMALLEST_CONE_RAD, FRAC_PI_2);
+                let inner = number(&light["spot"], "innerConeAngle", 0.0);
                 LampKind::Spot(Spot {
                     position,
                     direction,
                     intensity,
-                    inner_angle_rad,
-                    outer_angle_rad,
+                    // Exporters write both alike for a sharp edge, which is a steep one.
+                    inner_angle_rad: inner.clamp(0.0, 0.999 * outer),
+                    outer_angle_rad: outer,
                     falloff: SpotFalloff::SquaredCosine,
                 })
             }
             Some("directional") => LampKind::Directional { direction, irradiance: intensity },
             _ => {
-                let (expected, found) =
-                    ("a light of type point, spot or directional", &light["type"]);
-                return Err(error(format!("expected {expected}, found {found}")));
+                let name = format!("lights of type {}", light["type"]);
+                self.ignored.add_named(features::GLTF_LIGHT_TYPE, &name, place);
+                return Ok(());
             }
         };
         if !light["range"].is_null() && !matches!(kind, LampKind::Directional { .. }) {

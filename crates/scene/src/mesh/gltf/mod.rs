@@ -16,7 +16,11 @@ mod skin;
 mod textures;
 mod variants;
 
-use std::{collections::HashMap, path::Path, sync::Arc};
+use std::{
+    collections::{HashMap, HashSet},
+    path::Path,
+    sync::Arc,
+};
 
 use glam::Mat4;
 use gltf::{Document, Node, buffer::Source};
@@ -155,7 +159,15 @@ impl GltfReader<'_> {
         let mut skinned = Vec::new();
         let mut seen_meshes = vec![false; document.meshes().count()];
         let scene = document.default_scene().or_else(|| document.scenes().next());
-        let scene = scene.ok_or_else(|| self.error("expected a scene with nodes, found none"))?;
+        let roots: Vec<Node> = match scene {
+            Some(scene) => scene.nodes().collect(),
+            None => {
+                let children =
+                    document.nodes().flat_map(|node| node.children().map(|own| own.index()));
+                let children: HashSet<usize> = children.collect();
+                document.nodes().filter(|node| !children.contains(&node.index())).collect()
+            }
+        };
         if self.budget.is_some() {
             for node in document.nodes() {
                 if let Some(mesh) = node.mesh() {
@@ -166,12 +178,16 @@ impl GltfReader<'_> {
         }
         // Use a stack, not recursion: nodes may nest deeper than the call stack.
         let mut stack: Vec<(Node, Mat4)> =
-            scene.nodes().map(|node| (node, Mat4::IDENTITY)).collect();
+            roots.into_iter().map(|node| (node, Mat4::IDENTITY)).collect();
         stack.reverse();
         while let Some((node, world_from_parent)) = stack.pop() {
             if worlds[node.index()].is_some() {
                 let message = format!("node {} has more than one parent", node.index());
                 return Err(self.error(message));
+            }
+            let visibility = &self.json["nodes"][node.index()]["extensions"]["KHR_node_visibility"];
+            if visibility["visible"] == false {
+                continue;
             }
             let stands = || Mat4::from_cols_array_2d(&node.transform().matrix());
             let parent_from_node = poses.get(&node.index()).copied().unwrap_or_else(stands);

@@ -12,7 +12,7 @@ use crate::{
     error::Result,
     features,
     geometry::extend,
-    mesh::{Mesh, RepeatedMesh, label},
+    mesh::{Mesh, RepeatedMesh, label, strip_triangles},
 };
 
 impl GltfReader<'_> {
@@ -128,12 +128,7 @@ impl GltfReader<'_> {
             triangles.push(triangle.map(|index| first_vertex + index));
         };
         match primitive.mode() {
-            Mode::TriangleStrip => {
-                for (index, corners) in indices.windows(3).enumerate() {
-                    let turn = index % 2;
-                    push([corners[turn], corners[1 - turn], corners[2]]);
-                }
-            }
+            Mode::TriangleStrip => strip_triangles(&indices).for_each(push),
             Mode::TriangleFan => {
                 for corners in indices.get(1..).unwrap_or_default().windows(2) {
                     push([indices[0], corners[0], corners[1]]);

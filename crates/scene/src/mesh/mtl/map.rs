@@ -77,8 +77,11 @@ pub(super) fn parse(text: &str) -> (&str, Options, Vec<&str>) {
                 }
             }
             "-blendu" | "-blendv" | "-cc" | "-type" => {
-                word();
-                unknown.push(option);
+                // Images are interpolated, and their colours stay.
+                let usual = if option == "-cc" { "off" } else { "on" };
+                if word() != Some(usual) {
+                    unknown.push(option);
+                }
             }
             "-s" | "-o" | "-t" => {
                 let mut numbers = Vec::new();

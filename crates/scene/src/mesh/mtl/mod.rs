@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
+use super::obj::statement;
 use crate::{
     beside::Folder,
-    error::{Error, Result},
     features::{self, Feature, Ignored},
 };
 use map::Map;
@@ -67,22 +67,17 @@ impl<'a> Library<'a> {
     }
 
     /// Reads a line into the last material, or begins one.
-    ///
-    /// # Errors
-    /// [`Error::Parse`] with the line for a colour that is none.
-    pub(super) fn read_line(&mut self, line: usize, text: &str) -> Result<()> {
-        let text = text.split('#').next().unwrap_or_default().trim();
-        let (key, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
-        if key == "newmtl" {
-            let (name, diffuse) = (rest.trim().to_owned(), Vec3::ONE);
+    pub(super) fn read_line(&mut self, line: usize, text: &str) {
+        let (key, rest) = statement(text);
+        if key.eq_ignore_ascii_case("newmtl") {
+            let (name, diffuse) = (rest.to_owned(), Vec3::ONE);
             self.materials.push(LibraryMaterial { name, diffuse, model: 2, ..Default::default() });
-            return Ok(());
+            return;
         }
         let Self { folder, within, path, materials } = self;
-        let Some(entry) = materials.last_mut().filter(|_| !key.is_empty()) else { return Ok(()) };
+        let Some(entry) = materials.last_mut().filter(|_| !key.is_empty()) else { return };
         let file = path.file_name().unwrap_or_default().to_string_lossy();
         entry.place = format!("{file}:{line}");
-        let error = |message: String| Error::parse(path, line, 1, message);
         let numbers: Vec<f32> =
             rest.split_ascii_whitespace().map_while(|word| word.parse().ok()).collect();
         let share = numbers.first().filter(|n| n.is_finite()).map(|n| n.clamp(0.0, 1.0));
@@ -98,21 +93,21 @@ impl<'a> Library<'a> {
                 entry.ignore(features::MTL_OPTION, &format!("option `{option}`"));
             }
             let place = entry.place.clone();
-            let Ok(path) = folder.file_within(within, name) else {
+            let Ok(path) = folder.found_within(within, name.trim_matches('"')) else {
                 entry.ignore(features::MTL_OUTSIDE, &format!("image `{name}`"));
                 return None;
             };
             Some(Map { path, place, options })
         };
         match key.to_ascii_lowercase().as_str() {
-            "kd" => {
-                let color = color.filter(|color| color.max_element() <= 1.0);
-                entry.diffuse = color.ok_or_else(|| {
-                    error(format!("expected `Kd` with three numbers from 0 to 1, found `{text}`"))
-                })?;
-            }
-            "ks" | "ke" | "tf" if color.is_none() => {
+            "kd" | "ks" | "ke" | "tf" if color.is_none() => {
                 entry.ignore(features::MTL_KEY, &format!("`{key}` that is no colour"));
+            }
+            "kd" => {
+                entry.diffuse = color.unwrap_or_default().min(Vec3::ONE);
+                if color.is_some_and(|color| color.max_element() > 1.0 + 1e-4) {
+                    entry.ignore(features::MTL_KEY, "part of `Kd` above 1");
+                }
             }
             "ks" => entry.specular = color.unwrap_or_default().min(Vec3::ONE),
             "ke" => entry.emission = color,
@@ -122,15 +117,18 @@ impl<'a> Library<'a> {
                 entry.exponent = exponent.copied().unwrap_or(0.0);
             }
             "ni" => entry.ior = numbers.first().copied(),
-            "illum" => match rest.trim().parse() {
+            "illum" => match rest.parse() {
                 Ok(model @ (0..=7 | 9)) => entry.model = model,
-                _ => entry.ignore(features::MTL_ILLUM_MODEL, &format!("`illum {}`", rest.trim())),
+                _ => entry.ignore(features::MTL_ILLUM_MODEL, &format!("`illum {rest}`")),
             },
             "d" if share.is_some() => entry.opacity = share,
             "tr" if share.is_some() => entry.transparency = share,
             "pr" if share.is_some() => entry.roughness = share,
             "pm" if share.is_some() => entry.metallic = share,
             "ka" if color == Some(Vec3::ZERO) => {}
+            // Of a coat, a sheen or an anisotropy of strength 0.
+            "pc" | "ps" | "aniso" if share == Some(0.0) => {}
+            "pcr" | "anisor" => {}
             "ka" => entry.ignore(features::MTL_KA, features::MTL_KA.name),
             "map_kd" => entry.color_map = map(entry),
             "map_d" => entry.opacity_map = map(entry),
@@ -141,6 +139,5 @@ impl<'a> Library<'a> {
             "bump" | "map_bump" => entry.bump_map = map(entry),
             _ => entry.ignore(features::MTL_KEY, &format!("`{key}`")),
         }
-        Ok(())
     }
 }

@@ -80,7 +80,12 @@ impl LibraryMaterial {
         let mut ignore = |feature: Feature| {
             ignored.add(feature, || format!("material `{}`", self.name));
         };
-        let opacity = self.opacity.or(self.transparency.map(|share| 1.0 - share)).unwrap_or(1.0);
+        // Some exporters write 1 for opaque: nobody writes what nobody sees.
+        let transparency = self.transparency.filter(|share| *share < 1.0);
+        if self.opacity.is_none() && self.transparency != transparency {
+            ignore(features::MTL_TRANSPARENT);
+        }
+        let opacity = self.opacity.or(transparency.map(|share| 1.0 - share)).unwrap_or(1.0);
         let is_of_coat = |ior: &f32| (COAT_IOR.0..=COAT_IOR.1).contains(ior);
         let ior = self.ior.filter(is_of_coat).unwrap_or(DEFAULT_IOR);
         let is_glossy = self.specular.max_element() > 0.0 && self.model >= 2;

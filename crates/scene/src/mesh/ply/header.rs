@@ -3,7 +3,10 @@
 use std::io::{BufRead, Read};
 
 use super::Source;
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    features,
+};
 
 /// Most bytes read of a header line; a longer one belongs to another kind of file.
 const MAX_HEADER_LINE_BYTES: u64 = 65_536;
@@ -158,7 +161,7 @@ impl Source<'_> {
                 }
                 ["comment" | "obj_info", ..] | [] => {}
                 ["end_header"] => break,
-                _ => return Err(self.error(format!("cannot read the header line `{text}`"))),
+                _ => self.ignored.add(features::PLY_HEADER, || format!("`{text}`")),
             }
         }
         self.line += 1;

@@ -1,44 +1,63 @@
 //! PLY \[Turk 1994\]: ascii and binary in both byte orders.
 //!
 //! The header may name elements and properties in any order and of any type. The reader uses
-//! `x y z`, `nx ny nz`, texture coordinates and colours of `vertex` and the list `vertex_indices` (or
-//! `vertex_index`) of `face`. It triangulates polygons with more than three corners in the plane of
-//! their Newell normal.
+//! `x y z`, `nx ny nz`, texture coordinates and colours of `vertex`, and of `face` or `tristrips` the list
+//! `vertex_indices` (or `vertex_index`), and the texture coordinates of corners in the list `texcoord`. It
+//! triangulates polygons with more than three corners in the plane of their Newell normal.
 
 mod header;
 
 use std::{
+    collections::HashMap,
     io::{BufRead, BufReader, ErrorKind, Read},
     path::Path,
 };
 
 use header::{Element, Encoding, Property, Scalar};
 
-use super::Mesh;
+use super::{Mesh, RESTART};
 use crate::{
     error::{Error, Result},
+    features::{self, Ignored},
     files,
     math::colour::srgb_to_linear,
     memory,
 };
 
 /// Names of texture coordinates; (0, 0) is the lower left corner.
-const UV_NAMES: [[&str; 2]; 4] =
-    [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
+const UV_NAMES: [[&str; 2]; 6] = [
+    ["u", "v"],
+    ["s", "t"],
+    ["texture_u", "texture_v"],
+    ["texture_s", "texture_t"],
+    ["s0", "t0"],
+    ["tu", "tv"],
+];
 
 /// Names of colours, and of their opacity.
-const COLOR_NAMES: [[&str; 4]; 2] = [["red", "green", "blue", "alpha"], ["r", "g", "b", "a"]];
+const COLOR_NAMES: [[&str; 4]; 3] = [
+    ["red", "green", "blue", "alpha"],
+    ["r", "g", "b", "a"],
+    ["diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"],
+];
 
 /// Bytes of a vertex (position, normal, coordinates) or of the triangles of a face.
 const ELEMENT_BYTES: u64 = 32;
 
-/// Reads a PLY file, or one compressed by gzip if its extension is `gz`.
+/// Reads a PLY file, or one compressed by gzip if its extension is `gz`; warns of what it leaves out.
 ///
 /// # Errors
 /// [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
-pub fn read(path: &Path) -> Result<Mesh> {
+pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     let (reader, file_bytes) = files::open_unpacked(path)?;
-    let mut source = Source { path, reader, encoding: Encoding::Ascii, bytes_read: 0, line: 1 };
+    let mut source = Source {
+        path,
+        reader,
+        encoding: Encoding::Ascii,
+        bytes_read: 0,
+        line: 1,
+        ignored: Ignored::default(),
+    };
     let elements = source.read_header()?;
     let mut mesh = Mesh::default();
     let vertex_count = vertex_count(path, &elements)?;
@@ -61,11 +80,8 @@ pub fn read(path: &Path) -> Result<Mesh> {
     for element in &elements {
         match element.name.as_str() {
             "vertex" => source.read_vertices(element, &mut mesh)?,
-            "face" => source.read_faces(element, vertex_count, &mut mesh, &mut polygons)?,
-            "tristrips" if element.count > 0 => {
-                let message = "triangle strips (element `tristrips`) are not supported; write the mesh \
-                               with faces";
-                return Err(Error::format(path, message));
+            "face" | "tristrips" => {
+                source.read_faces(element, vertex_count, &mut mesh, &mut polygons)?;
             }
             _ => {
                 for index in 0..element.count {
@@ -81,16 +97,20 @@ pub fn read(path: &Path) -> Result<Mesh> {
         mesh.push_polygon(&polygons.corners[start..end]);
         start = end;
     }
+    warnings.extend(source.ignored.warnings(path));
     Ok(mesh)
 }
 
 fn vertex_count(path: &Path, elements: &[Element]) -> Result<u32> {
-    for name in ["vertex", "face"] {
-        let found = elements.iter().filter(|element| element.name == name).count();
-        if found != 1 {
-            let expected = format!("expected one element `{name}`, found {found}");
-            return Err(Error::format(path, expected));
-        }
+    let count = |name: &str| elements.iter().filter(|element| element.name == name).count();
+    let (vertices, faces, strips) = (count("vertex"), count("face"), count("tristrips"));
+    if vertices != 1 {
+        let expected = format!("expected one element `vertex`, found {vertices}");
+        return Err(Error::format(path, expected));
+    }
+    if faces > 1 || strips > 1 || faces + strips == 0 {
+        let expected = format!("expected one element `face` or `tristrips`, found {faces}");
+        return Err(Error::format(path, expected));
     }
     let count = elements.iter().find(|element| element.name == "vertex").map_or(0, |v| v.count);
     u32::try_from(count).map_err(|_| {
@@ -105,6 +125,34 @@ struct Polygons {
     ends: Vec<usize>,
 }
 
+/// Vertices with the texture coordinates of the corners that use them.
+#[derive(Debug, Default)]
+struct Seams {
+    /// True for vertices of the file that have coordinates.
+    taken: Vec<bool>,
+    vertices: HashMap<(u32, [u32; 2]), u32>,
+}
+
+impl Seams {
+    /// Vertex like that of a corner with its coordinates: itself, or another where a seam parts them. Corners
+    /// of vertices that are not read yet keep none.
+    fn vertex(&mut self, mesh: &mut Mesh, corner: u32, uv: [f32; 2]) -> u32 {
+        if self.taken.is_empty() {
+            self.taken = vec![false; mesh.positions.len()];
+            mesh.uvs[0].resize(mesh.positions.len(), [0.0; 2]);
+        }
+        let Some(taken) = self.taken.get_mut(corner as usize) else { return corner };
+        let is_taken = std::mem::replace(taken, true);
+        let key = (corner, uv.map(f32::to_bits));
+        *self.vertices.entry(key).or_insert_with(|| {
+            let vertex = if is_taken { mesh.repeat_vertex(corner) } else { None };
+            let vertex = vertex.unwrap_or(corner);
+            mesh.uvs[0][vertex as usize] = uv;
+            vertex
+        })
+    }
+}
+
 /// Reader with its position in the file.
 struct Source<'a> {
     path: &'a Path,
@@ -113,6 +161,7 @@ struct Source<'a> {
     bytes_read: u64,
     /// Line of an ascii file, from 1.
     line: usize,
+    ignored: Ignored,
 }
 
 impl Source<'_> {
@@ -191,11 +240,23 @@ impl Source<'_> {
         if element.count > 0
             && !element.properties.iter().any(|p| is_indices(p) && p.list_count.is_some())
         {
-            let message = "expected the list property `vertex_indices` of element `face`";
+            let message = format!(
+                "expected the list property `vertex_indices` of element `{}`",
+                element.name
+            );
             return Err(Error::format(self.path, message));
         }
+        for property in &element.properties {
+            let is_color = COLOR_NAMES.iter().flatten().any(|name| *name == property.name);
+            if is_color || property.name == "texnumber" {
+                let name = format!("`{}` of {}s", property.name, element.name);
+                self.ignored.add_named(features::PLY_FACE, &name, || "the header".to_owned());
+            }
+        }
+        let is_strip = element.name == "tristrips";
         mesh.triangles.reserve_exact(element.count as usize);
-        let mut corners = Vec::new();
+        let (mut corners, mut uvs) = (Vec::new(), Vec::new());
+        let mut seams = Seams::default();
         for index in 0..element.count {
             for property in &element.properties {
                 let place = Place { element, index };
@@ -205,6 +266,10 @@ impl Source<'_> {
                         corners.clear();
                         for _ in 0..count {
                             let corner = self.scalar(property.value, place)?;
+                            if is_strip && corner == -1.0 {
+                                corners.push(RESTART);
+                                continue;
+                            }
                             if !(corner >= 0.0 && corner < f64::from(vertex_count)) {
                                 return Err(self.error(format!(
                                     "face {index} of {}: vertex index {corner} is out of range, \
@@ -214,16 +279,28 @@ impl Source<'_> {
                             }
                             corners.push(corner as u32);
                         }
-                        match corners.as_slice() {
-                            &[a, b, c] => mesh.triangles.push([a, b, c]),
-                            [] | [_] | [_, _] => {}
-                            polygon => {
-                                polygons.corners.extend_from_slice(polygon);
-                                polygons.ends.push(polygons.corners.len());
-                            }
+                    }
+                    Some(count_type) if property.name == "texcoord" => {
+                        uvs.clear();
+                        for _ in 0..self.list_count(count_type, place)? {
+                            uvs.push(self.scalar(property.value, place)? as f32);
                         }
                     }
                     _ => self.skip(property, place)?,
+                }
+            }
+            if !is_strip && uvs.len() == 2 * corners.len() {
+                for (corner, uv) in corners.iter_mut().zip(uvs.as_chunks().0) {
+                    *corner = seams.vertex(mesh, *corner, *uv);
+                }
+            }
+            match corners.as_slice() {
+                strips if is_strip => mesh.push_strips(strips),
+                &[a, b, c] => mesh.triangles.push([a, b, c]),
+                [] | [_] | [_, _] => {}
+                polygon => {
+                    polygons.corners.extend_from_slice(polygon);
+                    polygons.ends.push(polygons.corners.len());
                 }
             }
         }
