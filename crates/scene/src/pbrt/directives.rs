@@ -128,10 +128,9 @@ impl<'a> Reader<'a> {
             "Identity" | "Translate" | "Scale" | "Rotate" | "LookAt" | "Transform"
             | "ConcatTransform" | "CoordinateSystem" | "CoordSysTransform" | "ActiveTransform"
             | "TransformTimes" => self.transformation(name, &place),
-            "AttributeBegin" => self.states.save(Saved::AttributeBegin, place),
-            "AttributeEnd" => self.states.restore(Saved::AttributeBegin, &place),
-            "TransformBegin" => self.states.save(Saved::TransformBegin, place),
-            "TransformEnd" => self.states.restore(Saved::TransformBegin, &place),
+            // Since version 4 they are the same.
+            "AttributeBegin" | "TransformBegin" => self.states.save(Saved::AttributeBegin, place),
+            "AttributeEnd" | "TransformEnd" => self.states.restore(Saved::AttributeBegin, &place),
             "Attribute" => {
                 let target = self.text(name)?;
                 let parameters = read_parameters(&mut self.source)?;
@@ -238,7 +237,7 @@ impl<'a> Reader<'a> {
 
     fn transformation(&mut self, name: &str, place: &Place) -> Result<()> {
         let ctm = self.states.now.ctm;
-        self.states.now.ctm = match name {
+        let moved = match name {
             "Identity" => DMat4::IDENTITY,
             "Translate" => ctm * DMat4::from_translation(DVec3::from_array(self.numbers(name)?)),
             "Scale" => ctm * DMat4::from_scale(DVec3::from_array(self.numbers(name)?)),
@@ -287,10 +286,14 @@ impl<'a> Reader<'a> {
                 if which != "All" {
                     self.log.ignore(features::PBRT_MOTION, place);
                 }
+                self.states.now.at_end = which == "EndTime";
                 ctm
             }
         };
-        if self.states.now.ctm.is_finite() {
+        if !self.states.now.at_end {
+            self.states.now.ctm = moved;
+        }
+        if moved.is_finite() {
             return Ok(());
         }
         Err(place.error(format!("{name}: the transformation leaves the range of numbers")))
@@ -327,12 +330,18 @@ impl<'a> Reader<'a> {
     /// Reads a directive of the part before `WorldBegin`.
     fn option(&mut self, name: &str, place: Place) -> Result<()> {
         if name == "Option" {
-            let parameters = read_parameters(&mut self.source)?;
-            for parameter in parameters {
-                let name = format!("Option `{}`", parameter.name);
-                self.log.ignore_named(features::PBRT_OPTION, &name, &parameter.place);
+            let name = self.text(name)?;
+            let name = format!("Option `{}`", name.split_whitespace().last().unwrap_or_default());
+            self.log.ignore_named(features::PBRT_OPTION, &name, &place);
+            // Its value is a word or a string, in brackets or not.
+            let mut token = self.source.next_here()?;
+            if token == Some(Token::Open) {
+                while !matches!(token, Some(Token::Close) | None) {
+                    token = self.source.next_here()?;
+                }
             }
-            return Ok(());
+            let error = || self.source.place().error(format!("{name}: expected its value"));
+            return token.map(drop).ok_or_else(error);
         }
         let kind = self.text(name)?;
         if name == "ColorSpace" {

@@ -48,11 +48,12 @@ pub(super) fn area_light(
     }
     let two_sided = entity.boolean("twosided", false)?;
     let mut scale = entity.number("scale", 1.0)?;
+    let texture = textures.light_image(entity)?;
     if let Some(power) = entity.optional("power")?.filter(|power| *power > 0.0) {
         let sides = if two_sided { 2.0 } else { 1.0 };
-        scale *= power / (sides * area * PI);
+        let mean = texture.as_ref().map_or(1.0, |image| luminance(image.mean().into()));
+        scale *= power / (sides * area * PI * f64::from(mean));
     }
-    let texture = textures.light_image(entity)?;
     if let (Some(_), Some(color)) = (&texture, entity.find("L")) {
         let message = "expected either `L` or `filename`, found both";
         return Err(color.place.error(format!("{}: {message}", entity.label())));

@@ -176,9 +176,14 @@ impl<'a> Materials<'a> {
 
     fn plastic(&mut self, entity: &Entity, surface: &mut Surface) -> Result<MaterialKind> {
         let value = self.textures.spectrum(entity, "reflectance")?;
-        let ior = self.ior(entity, "eta", COAT_IOR)?;
-        let below = albedo_below_coat(ior);
+        let ior = self.ior(entity, "eta", (SOLID_IOR.0, COAT_IOR.1))?;
         let mut diffuse = color(value.unwrap_or(Value::number(0.5)), surface);
+        // Such a coat reflects next to nothing.
+        if ior < COAT_IOR.0 {
+            entity.without_effect("roughness uroughness vroughness remaproughness");
+            return Ok(MaterialKind::Diffuse { reflectance: diffuse });
+        }
+        let below = albedo_below_coat(ior);
         match &mut surface.color {
             Some(texture) => *texture = texture.mapped(below),
             None => diffuse = diffuse.map(below),

@@ -42,7 +42,7 @@ use crate::{
     beside::Folder,
     error::{Error, Result},
     files,
-    import::Imported,
+    import::{Imported, Value},
     material::{Emission, Material, MaterialKind},
     strands::Detail,
 };
@@ -150,13 +150,28 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
 fn asked(description: &Description, log: &mut Log) -> Asked {
     let number = |entity: &Option<Entity>, name: &str| {
         let number = entity.as_ref()?.find(name)?.numbers().first().copied()?;
-        (number >= 1.0).then_some(number as u32)
+        (number >= 0.0).then_some(number as u32)
     };
+    let of_strata = || {
+        let [across, down] =
+            ["xsamples", "ysamples"].map(|name| number(&description.sampler, name));
+        across?.checked_mul(down?)
+    };
+    let samples = number(&description.sampler, "pixelsamples").or_else(of_strata);
+    // pbrt's own depth where the file states none.
+    let depth = number(&description.integrator, "maxdepth").unwrap_or(5);
     let asked = Asked {
-        samples: number(&description.sampler, "pixelsamples"),
-        depth: number(&description.integrator, "maxdepth").map(|d| d.min(Asked::MAX_DEPTH)),
+        samples: samples.filter(|samples| *samples > 0),
+        depth: Some(depth.clamp(1, Asked::MAX_DEPTH)),
         roulette_depth: None,
     };
+    for entity in [&description.sampler, &description.integrator].into_iter().flatten() {
+        entity.without_effect(
+            "seed randomization jitter lightsampler mutationsperpixel bootstrapsamples chains sigma \
+             largestepprobability photonsperiteration iterations radius",
+        );
+        log.unused(entity);
+    }
     let Some(entity) = &description.integrator else { return asked };
     let is_known =
         ["path", "volpath", "simplepath", "simplevolpath", "bdpt", "mlt", "sppm", "lightpath"];
@@ -244,8 +259,15 @@ impl Builder<'_> {
                 }
                 let opacity = self.materials.textures.number(&shape.entity, "alpha")?;
                 let kept = made.map(|mut material| {
-                    if let Some(opacity) = opacity {
-                        set_opacity(&mut material.surface, opacity);
+                    match (opacity, &light) {
+                        // pbrt's rays pass such a light, which shines all the same.
+                        (Some(Value::Constant(Vec3::ZERO)), Some(_)) => {
+                            material.kind = MaterialKind::Diffuse { reflectance: Vec3::ZERO };
+                            let log = &mut self.materials.textures.log;
+                            log.ignore(features::PBRT_INVISIBLE_LIGHT, &shape.entity.place);
+                        }
+                        (Some(opacity), _) => set_opacity(&mut material.surface, opacity),
+                        (None, _) => {}
                     }
                     material.surface.emission = light.filter(|light| light.radiance != Vec3::ZERO);
                     self.made.push(material);

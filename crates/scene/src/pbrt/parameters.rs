@@ -334,11 +334,13 @@ pub(super) fn read_parameters(source: &mut Source) -> Result<Vec<Parameter>> {
                     let message = format!("more than {MAX_PARAMETERS} parameters of one directive");
                     return Err(parameter.place.error(message));
                 }
-                if parameters.iter().any(|other| other.name == parameter.name) {
-                    let message = format!("parameter `{}` is given twice", parameter.name);
-                    return Err(parameter.place.error(message));
-                }
+                // The last of a name counts; the others are unused.
+                let same = parameters.iter().position(|other| other.name == parameter.name);
                 parameters.push(parameter);
+                if let Some(same) = same {
+                    let last = parameters.len() - 1;
+                    parameters.swap(same, last);
+                }
             }
             Some(Token::Word) => {
                 source.hold(Token::Word);

@@ -32,7 +32,8 @@ pub(super) fn mesh(
         "plymesh" => {
             let file = entity.required("filename")?;
             let path = folder.file(file).map_err(|message| entity.error(message))?;
-            let mut mesh = ply::read(&path).map_err(|error| entity.error(error.to_string()))?;
+            let mut mesh = ply::read(&path, &mut log.warnings)
+                .map_err(|error| entity.error(error.to_string()))?;
             // pbrt does not read them.
             mesh.colors.clear();
             for name in ["displacement", "displacement.edgelength"] {
@@ -96,19 +97,21 @@ fn groups<const N: usize>(entity: &Entity, vertex_count: usize) -> Result<Vec<[u
     Ok(groups.map(|indices| std::array::from_fn(|at| indices[at] as u32)).collect())
 }
 
-/// Reads an attribute of vertices: nothing, or one for each.
+/// Reads an attribute of vertices: nothing, or one for each; of another length it is named and left out.
 fn attribute<const N: usize>(
     entity: &Entity,
     name: &str,
     kind: Kind,
     vertex_count: usize,
+    log: &mut Log,
 ) -> Result<Vec<[f32; N]>> {
-    let found = vector(entity.numbers(name, kind)?);
-    if found.is_empty() || found.len() == vertex_count {
-        return Ok(found);
+    let mut found = vector(entity.numbers(name, kind)?);
+    if !found.is_empty() && found.len() != vertex_count {
+        let name = format!("`{name}` of another number than the vertices");
+        log.ignore_named(features::PBRT_PARAMETER, &name, &entity.place);
+        found.clear();
     }
-    let message = format!("`{name}`: expected one for each of {vertex_count} vertices");
-    Err(entity.error(format!("{message}, found {}", found.len())))
+    Ok(found)
 }
 
 fn triangle_mesh(entity: &Entity, log: &mut Log) -> Result<Mesh> {
@@ -121,8 +124,8 @@ fn triangle_mesh(entity: &Entity, log: &mut Log) -> Result<Mesh> {
     entity.find("faceIndices");
     Ok(Mesh {
         triangles: groups(entity, count)?,
-        normals: attribute(entity, "N", Kind::Triple, count)?,
-        uvs: [attribute(entity, "uv", Kind::Pair, count)?, Vec::new()],
+        normals: attribute(entity, "N", Kind::Triple, count, log)?,
+        uvs: [attribute(entity, "uv", Kind::Pair, count, log)?, Vec::new()],
         positions,
         ..Mesh::default()
     })
@@ -234,8 +237,8 @@ fn bilinear_mesh(entity: &Entity, log: &mut Log) -> Result<Mesh> {
     let positions = positions(entity)?;
     let count = positions.len();
     let patches: Vec<[u32; 4]> = groups(entity, count)?;
-    let normals: Vec<[f32; 3]> = attribute(entity, "N", Kind::Triple, count)?;
-    let uvs: Vec<[f32; 2]> = attribute(entity, "uv", Kind::Pair, count)?;
+    let normals: Vec<[f32; 3]> = attribute(entity, "N", Kind::Triple, count, log)?;
+    let uvs: Vec<[f32; 2]> = attribute(entity, "uv", Kind::Pair, count, log)?;
     entity.find("faceIndices");
     if let Some(parameter) = entity.find("emissionfilename") {
         log.ignore(features::PBRT_EMISSION_IMAGE, &parameter.place);

@@ -58,26 +58,32 @@ impl Source {
 
     /// Next token, or the end of an imported file or of everything.
     pub(super) fn next(&mut self) -> Result<Part> {
-        if let Some(token) = self.held.take() {
-            return Ok(Part::Token(token));
-        }
+        Ok(match self.next_here()? {
+            Some(token) => Part::Token(token),
+            None if self.close() => Part::EndOfImport,
+            None => Part::End,
+        })
+    }
+
+    /// Next token; none at the end of an imported file or of the main one, which `next` tells.
+    pub(super) fn next_here(&mut self) -> Result<Option<Token>> {
         loop {
-            if let Some(token) = self.open.tokens.next()? {
-                return Ok(Part::Token(token));
-            }
-            let Some(outer) = self.outer.pop() else { return Ok(Part::End) };
-            let closed = std::mem::replace(&mut self.open, outer);
-            // All files together have so many bytes.
-            self.open.tokens.bytes_left = closed.tokens.bytes_left;
-            if closed.restores {
-                return Ok(Part::EndOfImport);
+            let token =
+                self.held.take().map_or_else(|| self.open.tokens.next(), |t| Ok(Some(t)))?;
+            // What is begun in an included file may go on after it.
+            if token.is_some() || self.open.restores || !self.close() {
+                return Ok(token);
             }
         }
     }
 
-    /// Next token of the file in hand; none at its end, which stays to be read by `next`.
-    pub(super) fn next_here(&mut self) -> Result<Option<Token>> {
-        self.held.take().map_or_else(|| self.open.tokens.next(), |held| Ok(Some(held)))
+    /// Returns to the file that includes the open one; false for the main one.
+    fn close(&mut self) -> bool {
+        let Some(outer) = self.outer.pop() else { return false };
+        let closed = std::mem::replace(&mut self.open, outer);
+        // All files together have so many bytes.
+        self.open.tokens.bytes_left = closed.tokens.bytes_left;
+        true
     }
 
     /// Returns the last token to be read again.

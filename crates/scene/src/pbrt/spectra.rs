@@ -51,10 +51,11 @@ fn source<'a>(parameter: &'a Parameter, folder: &Folder) -> Result<Source<'a>> {
         (_, Values::Numbers(numbers)) => samples(numbers),
         _ => {
             let name = parameter.text();
-            if !name.ends_with(".spd") {
-                return Ok(Source::Name(name));
-            }
-            let path = folder.file(name).map_err(error)?;
+            let path = match folder.file(name) {
+                Ok(path) if path.exists() || name.ends_with(".spd") => path,
+                Err(message) if name.ends_with(".spd") => return Err(error(message)),
+                _ => return Ok(Source::Name(name)),
+            };
             let text = files::read_text(&path).map_err(|e| error(e.to_string()))?;
             let lines = text.lines().map(|line| line.split('#').next().unwrap_or(""));
             let words = lines.flat_map(str::split_ascii_whitespace);

@@ -68,6 +68,8 @@ impl Attributes {
 pub(super) struct State {
     /// Current transformation matrix: world from object, or camera from world before `Camera`.
     pub ctm: DMat4,
+    /// True while transformations count for the end of the motion alone, which is not rendered.
+    pub at_end: bool,
     /// True after an odd number of `ReverseOrientation`.
     pub reverse: bool,
     pub material: MaterialChoice,
@@ -83,8 +85,6 @@ pub(super) struct State {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Saved {
     AttributeBegin,
-    /// Restores the matrix alone.
-    TransformBegin,
     ObjectBegin,
     Import,
 }
@@ -113,11 +113,7 @@ impl States {
     pub(super) fn restore(&mut self, why: Saved, place: &Place) -> Result<()> {
         match self.saved.pop() {
             Some((found, state, _)) if found == why => {
-                if why == Saved::TransformBegin {
-                    self.now.ctm = state.ctm;
-                } else {
-                    self.now = state;
-                }
+                self.now = state;
                 Ok(())
             }
             Some((found, _, begin)) => Err(place.error(format!(

@@ -2,7 +2,10 @@
 
 use std::{io::BufRead, path::Path, rc::Rc};
 
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    files,
+};
 
 /// Longest word or string, bytes.
 const MAX_LENGTH: usize = 1 << 16;
@@ -80,14 +83,13 @@ impl<R: BufRead> Tokens<R> {
             Some(b'"') => self.read_text()?,
             Some(_) => self.read_word()?,
         };
+        self.text.clear();
         match std::str::from_utf8(&self.buffer) {
-            Ok(text) => {
-                self.text.clear();
-                self.text.push_str(text);
-                Ok(Some(token))
-            }
-            Err(_) => Err(self.place.error("not a text file: expected UTF-8")),
+            Ok(text) => self.text.push_str(text),
+            Err(_) if token == Token::Text => self.text.push_str(&files::decoded(&self.buffer)),
+            Err(_) => return Err(self.place.error("not a text file: expected UTF-8")),
         }
+        Ok(Some(token))
     }
 
     fn take(&mut self, token: Token) -> Token {
