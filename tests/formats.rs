@@ -37,7 +37,7 @@ fn load(name: &str, text: &str) -> Scene {
 fn everything_that_a_gltf_file_loses_is_named_once() {
     let materials = r#"{"name": "wood", "alphaMode": "MASK", "emissiveFactor": [1, 0, 0],
             "normalTexture": {"index": 0}, "occlusionTexture": {"index": 0},
-            "extensions": {"KHR_materials_clearcoat": {}, "KHR_materials_transmission":
+            "extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 1}, "KHR_materials_transmission":
                 {"transmissionFactor": 0.4}, "NEW_one": {}},
             "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": {"index": 0,
                 "extensions": {"KHR_texture_transform": {"texCoord": 2}}}}},
@@ -196,7 +196,7 @@ fn everything_that_an_obj_file_loses_is_named_once() {
         "room.mtl",
         "newmtl leaf\nKd 0.2 0.5 0.1 # green\nKa 0 0 0\nKs 0 0 0\nTf 0 1 0\nbump leaf.png\nillum 2\n\
          newmtl paint\nKd 0.5 0.5 0.5\nKs 0.3 0.3 0.3\nNs 98\nNi 1.6\nillum 10\nmap_Ks a.png\n\
-         map_Kd -blendu on a.png\nKe 1 1 1\n",
+         map_Kd -blendu off a.png\nKe 1 1 1\n",
     );
     let text = "mtllib room.mtl\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0\nvt 0 0\ng a\ns 1\nf 1 2 3\n\
         usemtl leaf\nf 1/1 2/1 3/1\nusemtl paint\nf 1 2 3\nusemtl lost\nf 3 2 1\nl 1 2\ncstype bezier\n";

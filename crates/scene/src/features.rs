@@ -62,7 +62,8 @@ features! {
 features! {
     /// Statements of OBJ files.
     OBJ;
-    OBJ_COLOR "vertex colours of faces with a material" "for those without, and materials with `vertex_color`; sRGB";
+    OBJ_COLOR "vertex colours of faces with a material"
+        "for those without, and materials with `vertex_color`; sRGB";
     OBJ_SMOOTHING "smoothing groups `s`" "where faces have no normals";
     OBJ_POINTS "points and lines" "`p`, `l`";
     OBJ_UNDESCRIBED "materials that no library describes" "they are white";

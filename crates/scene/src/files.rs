@@ -256,7 +256,7 @@ pub(crate) fn open_unpacked(path: &Path) -> Result<(BufReader<Box<dyn Read>>, u6
         _ => (Box::new(file), bytes),
     };
     let mut reader = BufReader::with_capacity(1 << 16, reader);
-    // What cannot be read fails where it is read.
+    // A file that cannot be read fails where it is read.
     if reader.fill_buf().is_ok_and(|start| start.starts_with(BYTE_ORDER_MARK)) {
         reader.consume(BYTE_ORDER_MARK.len());
     }

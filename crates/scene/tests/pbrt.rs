@@ -1013,7 +1013,7 @@ fn other_files_are_included_plain_and_compressed() {
     assert!(refused("c.pbrt", "Include \"no.pbrt\"").contains("no.pbrt: cannot read"));
 }
 
-/// What exporters and the scenes of pbrt-v4 write, by the source of pbrt-v4.
+/// Directives as exporters and the scenes of pbrt-v4 write them, by the source of pbrt-v4.
 #[test]
 fn files_of_others_mean_what_pbrt_takes_them_for() {
     let head = r#"Sampler "stratified" "integer xsamples" 4 "integer ysamples" 2"#;

@@ -13,7 +13,7 @@ use std::{
 
 use super::{
     Mesh, MeshMaterial,
-    mtl::{Library, LibraryMaterial},
+    mtl::{Library, LibraryMaterial, statement},
 };
 use glam::Vec3;
 
@@ -88,23 +88,6 @@ fn for_each_line(
             }
         }
     }
-}
-
-/// Keyword and rest of a statement without its comment. Names may hold a `#`: theirs is one that stands alone.
-pub(super) fn statement(text: &str) -> (&str, &str) {
-    let text = text.trim();
-    let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
-    if keyword.starts_with('#') {
-        return ("", "");
-    }
-    let key = keyword.to_ascii_lowercase();
-    let has_name = matches!(&*key, "o" | "g" | "usemtl" | "mtllib" | "newmtl" | "bump" | "norm")
-        || key.starts_with("map_");
-    let comment = match rest.strip_suffix(" #") {
-        Some(name) if has_name => Some(name.len()),
-        _ => rest.find(if has_name { " # " } else { "#" }),
-    };
-    (keyword, rest[..comment.unwrap_or(rest.len())].trim())
 }
 
 /// Position, texture coordinates and normal that a face uses together, linked to the next of the same

@@ -70,7 +70,7 @@ impl Source {
         loop {
             let token =
                 self.held.take().map_or_else(|| self.open.tokens.next(), |t| Ok(Some(t)))?;
-            // What is begun in an included file may go on after it.
+            // Parameters that begin in an included file may go on after it.
             if token.is_some() || self.open.restores || !self.close() {
                 return Ok(token);
             }

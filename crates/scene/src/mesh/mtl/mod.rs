@@ -7,12 +7,29 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::obj::statement;
 use crate::{
     beside::Folder,
     features::{self, Feature, Ignored},
 };
 use map::Map;
+
+/// Keyword and rest of a statement without its comment. Names may hold a `#`: there a comment begins at one
+/// that stands alone.
+pub(super) fn statement(text: &str) -> (&str, &str) {
+    let text = text.trim();
+    let (keyword, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    if keyword.starts_with('#') {
+        return ("", "");
+    }
+    let key = keyword.to_ascii_lowercase();
+    let has_name = matches!(&*key, "o" | "g" | "usemtl" | "mtllib" | "newmtl" | "bump" | "norm")
+        || key.starts_with("map_");
+    let comment = match rest.strip_suffix(" #") {
+        Some(name) if has_name => Some(name.len()),
+        _ => rest.find(if has_name { " # " } else { "#" }),
+    };
+    (keyword, rest[..comment.unwrap_or(rest.len())].trim())
+}
 
 /// Material library as far as it has been read.
 pub(super) struct Library<'a> {
@@ -126,7 +143,7 @@ impl<'a> Library<'a> {
             "pr" if share.is_some() => entry.roughness = share,
             "pm" if share.is_some() => entry.metallic = share,
             "ka" if color == Some(Vec3::ZERO) => {}
-            // Of a coat, a sheen or an anisotropy of strength 0.
+            // A coat, a sheen or an anisotropy of strength 0 changes nothing.
             "pc" | "ps" | "aniso" if share == Some(0.0) => {}
             "pcr" | "anisor" => {}
             "ka" => entry.ignore(features::MTL_KA, features::MTL_KA.name),
