@@ -116,6 +116,7 @@ features! {
     PBRT_CURVE "exact form of `curve`" "tubes of 3 to 6 sides";
     PBRT_PARTIAL "`phimax`, `zmin`, `zmax`, by shape" "quadrics are whole";
     PBRT_DISPLACEMENT "`displacement` of shapes, or beside a `normalmap`" "left out";
+    PBRT_MISSING "files of shapes that are not there" "left out";
     PBRT_FLAT "shapes whose transformation flattens space" "left out";
     PBRT_COATED_CONDUCTOR "coat of `coatedconductor`" "rendered as the bare conductor";
     PBRT_TRANSMISSION "images of `diffusetransmission` that differ"

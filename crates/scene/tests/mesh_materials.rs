@@ -827,7 +827,7 @@ fn obj_files_of_others_are_read() {
     let names = library.replace("Mat #1", "gr\u{fc}n").replace("Mat #2", "gr\u{e4}n");
     assert_eq!(reflectances(&latin(&text), &latin(&names)).0, [0.1, 0.2]);
     // A comment goes on in no other line, and what is no number or no face is left out.
-    let odd = format!("# a \\\n{corners}v -nan(ind) 0 0\nf 1 2\nf 1/9 2/0 3//7\n");
+    let odd = format!("# a \\\n{corners}v -nan(ind) 0 -1.#IND\nf 1 2\nf 1/9 2/0 3//7\n");
     let (found, warnings) = reflectances(odd.as_bytes(), b"");
     assert_eq!(found, [0.5]);
     for expected in [
@@ -839,6 +839,22 @@ fn obj_files_of_others_are_read() {
     let wide: Vec<u8> = "v 0 0 0\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
     let path = folder.write("a.obj", [&b"\xff\xfe"[..], &wide].concat());
     assert!(Scene::load(&path).unwrap_err().to_string().contains("found UTF-16: save it as UTF-8"));
+}
+
+/// Surveyors write metres from an origin far away.
+#[test]
+fn a_scene_far_from_the_origin_is_named() {
+    let folder = Folder::new();
+    for (place, is_named) in [(4_649_776.0, true), (100.0, false)] {
+        let corners = format!("v {place} 0 0\nv {} 0 0\nv {place} 3 0\nf 1 2 3\n", place + 3.0);
+        let scene = Scene::load(&folder.write("a.obj", corners)).unwrap();
+        let is_far =
+            |text: &String| text.contains("have steps of 5.5") && text.contains("of 3e0: move");
+        assert_eq!(scene.warnings.iter().any(is_far), is_named, "{:?}", scene.warnings);
+    }
+    let flat = "v 4649776 0 0\nv 4649776.1 0 0\nv 4649776 0.1 0\nf 1 2 3\n";
+    let message = Scene::load(&folder.write("a.obj", flat)).unwrap_err().to_string();
+    assert!(message.contains("found neither (") && message.contains("of zero area"), "{message}");
 }
 
 /// Loads an OBJ triangle with the only material of a library.
@@ -1051,6 +1067,11 @@ fn ply_coordinates_and_colours_are_read() {
         // 48316 of 65535 is 188 of 255.
         assert!((r, g, a) == (1.0, b, 1.0) && (b - 0.5029).abs() < 1e-3, "{g} {b}");
     }
+    let unknown = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+        property float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n\
+        -nan(ind) 1.#QNAN 0\n";
+    let mesh = Mesh::read(&folder.write("d.ply", unknown), &mut Vec::new()).unwrap();
+    assert!(mesh.positions[0][0].is_nan() && mesh.positions[0][1].is_nan());
     // MeshLab gives corners coordinates, and Blender 2.47 forgot to mark a comment.
     let text = "ply\nformat ascii 1.0\nMade by Blender\nelement vertex 4\nproperty float x\n\
         property float y\nproperty float z\nproperty uchar diffuse_red\nproperty uchar diffuse_green\n\

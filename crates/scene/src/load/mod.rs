@@ -24,6 +24,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     files,
+    instance::bounds,
     material::{Material, MaterialKind},
 };
 use arrays::{Arrays, NONE};
@@ -159,6 +160,8 @@ fn viewed(camera: &CameraEntry, options: &LoadOptions) -> CameraEntry {
     viewed
 }
 
+/// Steps of single precision that the longest side of a scene should have.
+const LEAST_STEPS: f32 = 2e4;
 /// Range of every finite number.
 const FINITE: (f32, f32) = (f32::MIN, f32::MAX);
 
@@ -210,13 +213,25 @@ impl<'a> Loader<'a> {
         EnvironmentMap::constant(radiance, 1.0).map_err(|message| self.error(message))
     }
 
-    /// Gives a scene its hash; warns of one without any light.
+    /// Gives a scene its hash; warns of one without any light, and of one whose place single precision blurs.
     fn finished(&self, mut scene: Scene) -> Scene {
         let is_dark = scene.lamps.is_empty()
             && scene.materials.iter().all(|material| material.surface.emission.is_none())
             && scene.environment.is_black();
         if is_dark {
             scene.warnings.push(format!("{}: no light: nothing is lit", self.path.display()));
+        }
+        if let Some([low, high]) = bounds(scene.geometry.used_extent()) {
+            let (farthest, size) =
+                (low.abs().max(high.abs()).max_element(), (high - low).max_element());
+            let step = farthest * f32::EPSILON;
+            if size < LEAST_STEPS * step {
+                scene.warnings.push(format!(
+                    "{}: coordinates of {farthest:e} have steps of {step:e} in a scene of {size:e}: move it to \
+                     the origin",
+                    self.path.display()
+                ));
+            }
         }
         scene.hash = super::hash::hash(&scene);
         scene

@@ -205,7 +205,10 @@ impl Loader<'_> {
         warnings: &mut Vec<String>,
     ) -> Result<CameraEntry> {
         let Some([low, high]) = bounds(geometry.used_extent()) else {
-            return Err(self.error("expected triangles or a camera, found neither"));
+            let why = warnings.iter().find(|text| text.contains("dropped"));
+            let why = why.map_or(String::new(), |text| format!(" ({text})"));
+            let message = "expected triangles or a camera, found neither";
+            return Err(self.error(format!("{message}{why}")));
         };
         let (position, look_at, fov, does) = match inside::view(geometry, low, high) {
             Some(View { from, at }) => (from, at, INSIDE_FOV_DEG, "stands in the room"),

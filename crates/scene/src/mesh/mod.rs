@@ -146,6 +146,12 @@ pub struct MeshMaterial {
     pub is_culled: bool,
 }
 
+/// Tests for a word by which C libraries print what is no number: `-nan(ind)`, `1.#IND`.
+fn is_no_number(word: &str) -> bool {
+    let word = word.trim_start_matches('-');
+    word.starts_with("nan(") || word.starts_with("1.#")
+}
+
 /// No corner, which ends a strip of triangles.
 const RESTART: u32 = u32::MAX;
 

@@ -12,7 +12,7 @@ use std::{
 };
 
 use super::{
-    Mesh, MeshMaterial,
+    Mesh, MeshMaterial, is_no_number,
     mtl::{Library, LibraryMaterial, statement},
 };
 use glam::Vec3;
@@ -186,9 +186,7 @@ impl ObjReader {
                 word => word.unwrap_or_default(),
             };
             let expected = if least == 3 { "three numbers" } else { "one number or two" };
-            // C libraries print what is no number in many ways.
-            let is_none = word.trim_start_matches('-').starts_with("nan(");
-            let number = word.parse().ok().or(is_none.then_some(f32::NAN));
+            let number = word.parse().ok().or(is_no_number(word).then_some(f32::NAN));
             *component =
                 number.ok_or_else(|| self.error(format!("expected {expected}, found `{word}`")))?;
         }

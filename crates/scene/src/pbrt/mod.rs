@@ -205,6 +205,9 @@ impl Builder<'_> {
     fn prepare(&mut self, shape: &Shape, in_object: bool) -> Result<Option<(Mesh, u32)>> {
         let Textures { folder, log, .. } = &mut self.materials.textures;
         let mut mesh = shapes::mesh(&shape.entity, folder, &mut self.strands, log)?;
+        if mesh.triangles.is_empty() {
+            return Ok(None);
+        }
         let light = match &shape.state.area_light {
             Some(entity) if in_object => {
                 self.materials.textures.log.ignore(features::PBRT_INSTANCE_LIGHT, &entity.place);

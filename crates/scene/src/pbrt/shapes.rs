@@ -32,6 +32,12 @@ pub(super) fn mesh(
         "plymesh" => {
             let file = entity.required("filename")?;
             let path = folder.file(file).map_err(|message| entity.error(message))?;
+            if !path.exists() {
+                let name = format!("mesh `{file}`, which is not there");
+                log.ignore_named(features::PBRT_MISSING, &name, &entity.place);
+                entity.without_effect("alpha displacement displacement.edgelength");
+                return Ok(Mesh::default());
+            }
             let mut mesh = ply::read(&path, &mut log.warnings)
                 .map_err(|error| entity.error(error.to_string()))?;
             // pbrt does not read them.

@@ -1,7 +1,7 @@
 //! Textures of a scene description → constants and [`TextureUse`]s: images and what scales, inverts and
 //! mixes them.
 
-use std::{collections::HashMap, path::PathBuf, sync::Arc};
+use std::{collections::HashMap, sync::Arc};
 
 use glam::Vec3;
 use half::f16;
@@ -30,7 +30,7 @@ pub(super) struct Textures<'a> {
     pub(super) folder: &'a Folder,
     /// Report of all that reads materials and lights.
     pub log: Log<'a>,
-    images: HashMap<(PathBuf, String), Arc<Texture>>,
+    images: HashMap<(String, String), Option<Arc<Texture>>>,
     /// Values of named textures, those of numbers apart.
     values: HashMap<(bool, String), Value>,
     /// Textures that refer to the one that is read.
@@ -175,8 +175,11 @@ impl<'a> Textures<'a> {
     fn image(&mut self, entity: &Entity, is_number: bool) -> Result<Value> {
         let file = entity.required("filename")?;
         let (encoding, gamma) = decoding(entity)?;
-        let texture = self.load(entity, file, gamma)?;
         let ([du, u], [dv, v]) = mapping(entity, &mut self.log)?;
+        let Some(texture) = self.load(entity, file, gamma) else {
+            entity.without_effect("filter maxanisotropy wrap scale invert");
+            return Ok(Value::number(0.5));
+        };
         let mut image = TextureUse {
             // v points up in pbrt, down in images.
             image_from_uv: [[u, 0.0, du], [0.0, -v, 1.0 - dv]],
@@ -213,15 +216,26 @@ impl<'a> Textures<'a> {
         Ok(value)
     }
 
-    /// Reads an image file once for each exponent that decodes its 8-bit colours, if one does.
-    fn load(&mut self, entity: &Entity, file: &str, gamma: Option<f32>) -> Result<Arc<Texture>> {
-        let path = self.folder.file(file).map_err(|message| entity.error(message))?;
-        let key = (path.clone(), format!("{gamma:?}"));
+    /// Reads an image file once for each exponent that decodes its 8-bit colours, if one does. A file that
+    /// cannot be read is a warning and no texture.
+    fn load(&mut self, entity: &Entity, file: &str, gamma: Option<f32>) -> Option<Arc<Texture>> {
+        let key = (file.to_owned(), format!("{gamma:?}"));
         if let Some(texture) = self.images.get(&key) {
-            return Ok(Arc::clone(texture));
+            return texture.clone();
         }
-        let loaded = Texture::load(&path, &mut self.log.warnings);
-        let mut texture = loaded.map_err(|error| entity.error(error.to_string()))?;
+        let loaded = self.folder.file(file).and_then(|path| {
+            let texture = Texture::load(&path, &mut self.log.warnings);
+            texture.map(|texture| (path, texture)).map_err(|error| error.to_string())
+        });
+        let (path, mut texture) = match loaded {
+            Ok(loaded) => loaded,
+            Err(message) => {
+                let error = entity.error(message);
+                self.log.warnings.push(format!("{error}; rendered without this texture"));
+                self.images.insert(key, None);
+                return None;
+            }
+        };
         if let (Some(gamma), Texels::Bytes(_) | Texels::Shorts(_)) = (gamma, &texture.texels) {
             let decoded = |[red, green, blue, alpha]: [f32; 4]| {
                 let [red, green, blue] = [red, green, blue].map(|value| value.powf(gamma));
@@ -232,24 +246,24 @@ impl<'a> Textures<'a> {
         }
         let texture = Arc::new(texture);
         self.log.inputs.push(path);
-        self.images.insert(key, Arc::clone(&texture));
-        Ok(texture)
+        self.images.insert(key, Some(Arc::clone(&texture)));
+        Some(texture)
     }
 
     /// Normal map that a material names, if it does.
     pub(super) fn normal_map(&mut self, entity: &Entity) -> Result<Option<TextureUse>> {
         let Some(file) = entity.string("normalmap")? else { return Ok(None) };
-        let texture = self.load(entity, file, None)?;
+        let texture = self.load(entity, file, None);
         let encoding = Encoding::Linear;
-        Ok(Some(TextureUse { encoding, ..TextureUse::from_lower_left(texture) }))
+        Ok(texture.map(|image| TextureUse { encoding, ..TextureUse::from_lower_left(image) }))
     }
 
     /// Image of the radiance of an area light, if it names one: shown once, (0, 0) at its lower left.
     pub(super) fn light_image(&mut self, entity: &Entity) -> Result<Option<TextureUse>> {
         let Some(file) = entity.string("filename")? else { return Ok(None) };
-        let texture = self.load(entity, file, None)?;
+        let texture = self.load(entity, file, None);
         let wrap = [Wrap::Clamp; 2];
-        Ok(Some(TextureUse { wrap, ..TextureUse::from_lower_left(texture) }))
+        Ok(texture.map(|image| TextureUse { wrap, ..TextureUse::from_lower_left(image) }))
     }
 }
 

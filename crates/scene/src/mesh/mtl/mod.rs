@@ -26,7 +26,9 @@ pub(super) fn statement(text: &str) -> (&str, &str) {
         || key.starts_with("map_");
     let comment = match rest.strip_suffix(" #") {
         Some(name) if has_name => Some(name.len()),
-        _ => rest.find(if has_name { " # " } else { "#" }),
+        _ if has_name => rest.find(" # "),
+        // A number may be printed as 1.#IND.
+        _ => rest.match_indices('#').map(|(at, _)| at).find(|at| !rest[..*at].ends_with('.')),
     };
     (keyword, rest[..comment.unwrap_or(rest.len())].trim())
 }

@@ -15,7 +15,7 @@ use std::{
 
 use header::{Element, Encoding, Property, Scalar};
 
-use super::{Mesh, RESTART};
+use super::{Mesh, RESTART, is_no_number};
 use crate::{
     error::{Error, Result},
     features::{self, Ignored},
@@ -367,7 +367,8 @@ impl Source<'_> {
             return Err(self.error(format!("truncated: the file ends in {place}")));
         }
         let word = String::from_utf8_lossy(&word[..length]);
-        word.parse().map_err(|_| self.error(format!("{place}: expected a number, found `{word}`")))
+        let number = word.parse().ok().or(is_no_number(&word).then_some(f64::NAN));
+        number.ok_or_else(|| self.error(format!("{place}: expected a number, found `{word}`")))
     }
 }
 
