@@ -207,9 +207,9 @@ fn sides_are_those_of_vertex_normals_else_of_the_winding() {
 #[test]
 fn quadrics_and_patches_face_outward() {
     for (shape, area) in [
-        ("\"sphere\" \"float radius\" 2", 16.0 * std::f32::consts::PI),
-        ("\"cylinder\" \"float zmin\" 0 \"float zmax\" 3", 6.0 * std::f32::consts::PI),
-        ("\"disk\" \"float height\" 1 \"float innerradius\" 0.5", 0.75 * std::f32::consts::PI),
+        ("\"sphere\" \"float radius\" 2", 16.0 * PI),
+        ("\"cylinder\" \"float zmin\" 0 \"float zmax\" 3", 6.0 * PI),
+        ("\"disk\" \"float height\" 1 \"float innerradius\" 0.5", 0.75 * PI),
         ("\"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0] \"integer faceIndices\" 3", 4.0),
         (
             r#""loopsubdiv" "integer levels" 1 "point3 P" [1 0 0 0 1 0 0 0 1]
@@ -597,7 +597,7 @@ fn lamps_have_their_places_and_powers() {
     assert!((spot.outer_angle_rad - 40_f32.to_radians()).abs() < 1e-6);
     // A smooth edge lets half of the light through: here (cos 0 + cos 60°) / 2 is 3/4.
     let LampKind::Spot(spot) = kinds[4] else { panic!() };
-    let power = 2.0 * std::f32::consts::PI * (1.0 - 0.75) * spot.intensity;
+    let power = 2.0 * PI * (1.0 - 0.75) * spot.intensity;
     assert!((power - 3.0).length() < 1e-4, "{power}");
     assert_eq!(warnings(&scene), [""; 0]);
     // A plain camera mirrors the world in z.
@@ -608,7 +608,7 @@ fn lamps_have_their_places_and_powers() {
         let light = format!(r#""diffuse" "float power" 3 "bool twosided" {two_sided}"#);
         let area = world(&format!(r#"AreaLightSource {light} Shape "disk""#));
         let radiance = area.materials[0].surface.emission.as_ref().unwrap().radiance.x;
-        let power = sides * radiance * std::f32::consts::PI.powi(2);
+        let power = sides * radiance * PI.powi(2);
         assert!((power - 3.0).abs() < 0.01, "{radiance}");
     }
 }
@@ -641,7 +641,7 @@ fn lamps_with_images_have_their_means() {
     let solid_angle: f32 = places
         .map(|(x, y)| 0.04 * 0.04 / (1.0 + (x - 2.0).powi(2) + (y - 1.0).powi(2)).powf(1.5))
         .sum();
-    let cone = 2.0 * std::f32::consts::PI * (1.0 - spot.outer_angle_rad.cos());
+    let cone = 2.0 * PI * (1.0 - spot.outer_angle_rad.cos());
     assert!((cone / solid_angle - 1.0).abs() < 2e-3, "{cone} {solid_angle}");
     let power = solid_angle * (0.2126 * intensity(3).x + 0.0722 * intensity(3).z);
     assert!((power - 1.0).abs() < 2e-3, "{power}");
