@@ -122,7 +122,7 @@ features! {
     PBRT_TRANSMISSION "images of `diffusetransmission` that differ"
         "the ratio of `reflectance` to `transmittance` is the same everywhere";
     PBRT_SUBSURFACE "light below `subsurface`" "rendered as plastic";
-    PBRT_HAIR "parameters of `hair`" "rendered as diffuse of 0.5";
+    PBRT_HAIR "parameters of `hair`" "rendered as diffuse of its `reflectance`, or 0.5";
     PBRT_MIX_LOBES "gloss of `mix`"
         "one lobe of the mean roughness; images on other coordinates than the first count by their means";
     PBRT_MIX "the lesser part of `mix` with glass or a sheet" "the other one is the whole surface";

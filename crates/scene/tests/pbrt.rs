@@ -1025,6 +1025,8 @@ fn files_of_others_mean_what_pbrt_takes_them_for() {
     assert!(warnings(&regularized)[0].contains("`regularize` of Integrator"));
     let kind = material(r#""coateddiffuse" "float eta" 1 "rgb reflectance" [.25 .25 .25]"#).kind;
     assert!(matches!(kind, MaterialKind::Diffuse { reflectance } if reflectance.x == 0.25));
+    let kind = material(r#""hair" "rgb color" [.25 .25 .25]"#).kind;
+    assert!(matches!(kind, MaterialKind::Diffuse { reflectance } if reflectance.x == 0.25));
     // The last of a name counts.
     let twice = r#"Material "diffuse" "rgb reflectance" [1 1 1] "rgb reflectance" [.25 .25 .25]"#;
     let scene = world(&format!("{twice} {TRIANGLE}"));
@@ -1329,7 +1331,7 @@ fn everything_left_out_is_named_once() {
         "ignored `albedo` of coats (line 13): coats are clear",
         "ignored `uroughness` other than `vroughness` (line 13): their mean α, or the texture",
         "ignored shapes whose transformation flattens space (2, first in line 14): left out",
-        "ignored parameters of `hair` (line 15): rendered as diffuse of 0.5",
+        "ignored parameters of `hair` (line 15): rendered as diffuse of its `reflectance`, or 0.5",
         "ignored marble (line 16)",
         "ignored directionmix (line 16)",
         "ignored tangents `S` of meshes (line 17)",

@@ -123,10 +123,14 @@ impl<'a> Materials<'a> {
             }
             "hair" => {
                 self.textures.log.ignore(features::PBRT_HAIR, &entity.place);
-                entity.without_effect(
-                    "sigma_a reflectance color eumelanin pheomelanin eta beta_m beta_n alpha",
-                );
-                MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) }
+                entity
+                    .without_effect("sigma_a color eumelanin pheomelanin eta beta_m beta_n alpha");
+                let value = match self.textures.spectrum(entity, "reflectance")? {
+                    None => self.textures.spectrum(entity, "color")?,
+                    found => found,
+                };
+                let reflectance = color(value.unwrap_or(Value::number(0.5)), &mut surface);
+                MaterialKind::Diffuse { reflectance }
             }
             "mix" => return self.mix(entity, name),
             "interface" | "none" | "" => return Ok(None),
