@@ -112,9 +112,9 @@ pub(crate) struct FilmBuffers {
     /// Window that there is room for.
     whole: Window,
     /// Window in use; another one lies in the first page.
-    window: Window,
+    pub(crate) window: Window,
     /// Part of it that is read back.
-    kept: Window,
+    pub(crate) kept: Window,
     /// Positions in film order of every page but the last, which may have fewer: of the whole window, and
     /// of the one in use.
     whole_page_positions: u32,
@@ -200,16 +200,6 @@ impl FilmBuffers {
         self.page_positions = self.padded_pixels();
     }
 
-    /// Reads back, from now on, a part of the window alone.
-    pub(crate) fn keep(&mut self, window: Window) {
-        self.kept = window;
-    }
-
-    /// Window that is read back.
-    pub(crate) fn kept(&self) -> Window {
-        self.kept
-    }
-
     /// Tests whether the whole window is read back.
     pub(crate) fn is_whole(&self) -> bool {
         self.kept == self.window
@@ -224,11 +214,6 @@ impl FilmBuffers {
             let start = row as usize * stride + left;
             start..start + width as usize
         })
-    }
-
-    /// Window in use.
-    pub(crate) fn window(&self) -> Window {
-        self.window
     }
 
     /// Descriptor set 3 of every page in use, its first pixel and its number of pixels.
@@ -294,15 +279,9 @@ impl FilmBuffers {
             origin: [self.kept.x, self.kept.y],
             ..Sums::default()
         };
-        for (index, layer) in sums.triples_mut().into_iter().enumerate() {
-            self.download_layer(index, layer)?;
-        }
-        for (index, layer) in sums.counts_mut().into_iter().enumerate() {
-            self.download_layer(TRIPLES.len() + index, layer)?;
-        }
-        for (index, layer) in sums.coverages_mut().into_iter().enumerate() {
-            self.download_layer(FIRST_COVERAGE + index, layer)?;
-        }
+        self.download_layers(0, &mut sums.triples_mut())?;
+        self.download_layers(TRIPLES.len(), &mut sums.counts_mut())?;
+        self.download_layers(FIRST_COVERAGE, &mut sums.coverages_mut())?;
         sums.groups = self.download_groups()?;
         Ok(sums)
     }
@@ -363,15 +342,9 @@ impl FilmBuffers {
                 page.radiance.upload(bytemuck::cast_slice(&samples))?;
             }
         }
-        for (index, layer) in sums.triples().into_iter().enumerate() {
-            self.upload_layer(index, layer)?;
-        }
-        for (index, layer) in sums.counts().into_iter().enumerate() {
-            self.upload_layer(TRIPLES.len() + index, layer)?;
-        }
-        for (index, layer) in sums.coverages().into_iter().enumerate() {
-            self.upload_layer(FIRST_COVERAGE + index, layer)?;
-        }
+        self.upload_layers(0, &sums.triples())?;
+        self.upload_layers(TRIPLES.len(), &sums.counts())?;
+        self.upload_layers(FIRST_COVERAGE, &sums.coverages())?;
         self.upload_groups(sums)
     }
 
@@ -429,35 +402,36 @@ impl FilmBuffers {
         bytes
     }
 
-    /// Reads one of [`LAYERS`] of all pages, if it is asked for.
-    fn download_layer<T: Pod>(&self, index: usize, layer: &mut Vec<T>) -> Result<()> {
-        if is_asked_for(index, self.aovs) {
+    /// Reads those of [`LAYERS`] from `first` on of all pages, as far as they are asked for.
+    fn download_layers<T: Pod>(&self, first: usize, layers: &mut [&mut Vec<T>]) -> Result<()> {
+        let asked_for = (first..).zip(layers).filter(|(index, _)| is_asked_for(*index, self.aovs));
+        for (index, layer) in asked_for {
             layer.reserve_exact(self.window.width as usize * self.window.height as usize);
             for page in &self.pages {
                 let add = |piece: &[T]| layer.extend_from_slice(piece);
                 page.layers[index].download_pieces(self.pixels_of(page), add)?;
             }
             if !self.is_whole() {
-                *layer = self.kept_rows().flat_map(|row| layer[row].iter().copied()).collect();
+                **layer = self.kept_rows().flat_map(|row| layer[row].iter().copied()).collect();
             }
         }
         Ok(())
     }
 
-    fn upload_layer<T: Pod>(&self, index: usize, layer: &[T]) -> Result<()> {
-        let mut whole = Vec::new();
-        let layer = if self.is_whole() || layer.is_empty() {
-            layer
-        } else {
-            whole.resize(self.window.width as usize * self.window.height as usize, T::zeroed());
-            for (row, values) in self.kept_rows().zip(layer.chunks(self.kept.width as usize)) {
-                whole[row].copy_from_slice(values);
+    fn upload_layers<T: Pod>(&self, first: usize, layers: &[&Vec<T>]) -> Result<()> {
+        for (index, mut layer) in (first..).zip(layers.iter().copied()) {
+            let mut whole = Vec::new();
+            if !self.is_whole() && !layer.is_empty() {
+                whole.resize(self.window.width as usize * self.window.height as usize, T::zeroed());
+                for (row, values) in self.kept_rows().zip(layer.chunks(self.kept.width as usize)) {
+                    whole[row].copy_from_slice(values);
+                }
+                layer = &whole;
             }
-            &whole
-        };
-        for page in self.pages.iter().filter(|_| is_asked_for(index, self.aovs)) {
-            if let Some(pixels) = layer.get(page.first..page.first + page.pixels) {
-                page.layers[index].upload(bytemuck::cast_slice(pixels))?;
+            for page in self.pages.iter().filter(|_| is_asked_for(index, self.aovs)) {
+                if let Some(pixels) = layer.get(page.first..page.first + page.pixels) {
+                    page.layers[index].upload(bytemuck::cast_slice(pixels))?;
+                }
             }
         }
         Ok(())

@@ -229,8 +229,7 @@ impl LampCells {
         let by_power = list_of(tables, &[], 1.0, list_length);
         let entries = by_power.into_iter().chain(lists.into_iter().flatten()).collect();
         let first_of = |number: usize| ((number + 1) * list_length) as u32;
-        let [width, height, depth] = grid.size;
-        let mut found = vec![0; FACES * (width * height * depth) as usize];
+        let mut found = vec![0; FACES * grid.size.iter().product::<u32>() as usize];
         let numbers: BTreeMap<usize, usize> = coarse.keys().copied().zip(fine.len()..).collect();
         for (index, list) in found.iter_mut().enumerate() {
             let (cell, face) = grid.cell_of(index);

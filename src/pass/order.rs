@@ -252,7 +252,8 @@ impl<'a> Order<'a> {
         if !self.is_lit() || surfaces.lamp_count == 0 {
             return;
         }
-        let rays = rays_to_lamps(self.wave.total_shadow_rays);
+        // Half as many as to the environment, at least one: docs/experiments.md, rays_to_lamps.
+        let rays = self.wave.total_shadow_rays.div_ceil(2).max(1);
         let to_lamps =
             Wave { to_lamps: 1, shadow_ray_count: 1, total_shadow_rays: rays, ..self.wave };
         let sample = Kernel::new("sample_lamps", Domain::Surfaces, &surfaces.constants());
@@ -342,10 +343,4 @@ fn path_list(domain: Domain, vertex: u32, first_listed: u32) -> u32 {
         Domain::Paths | Domain::Pixels => None,
     };
     listed_at.filter(|vertex| *vertex >= first_listed).map_or(0, |vertex| 1 + vertex % PATH_LISTS)
-}
-
-/// Number of rays to lamps at a vertex with `shadow_rays` rays to the environment: half as many, at
-/// least one (docs/experiments.md, rays_to_lamps).
-fn rays_to_lamps(shadow_rays: u32) -> u32 {
-    shadow_rays.div_ceil(2).max(1)
 }

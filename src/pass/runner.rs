@@ -117,7 +117,7 @@ impl Runner {
 
     /// Keeps the samples of a part of the window alone.
     pub(crate) fn keep(&mut self, window: Window) {
-        self.film.keep(window);
+        self.film.kept = window;
     }
 
     /// Calls `watch` after the waves of all sweeps from now on.

@@ -197,7 +197,7 @@ impl Renderer {
     pub fn restore(&mut self, sums: &Sums) -> Result<()> {
         let most_samples = sums.sample_count.saturating_add(u32::from(!sums.ahead.is_none()));
         self.technique.check_resume(most_samples, &self.progress())?;
-        let window = self.runner.film().kept();
+        let window = self.runner.film().kept;
         if sums.film_size != self.film_size
             || sums.origin != [window.x, window.y]
             || [sums.width, sums.height] != [window.width, window.height]

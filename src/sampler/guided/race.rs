@@ -103,7 +103,7 @@ struct Blocks {
 
 impl Blocks {
     fn of(runner: &Runner) -> Self {
-        Self::over(runner.film().padded_pixels(), runner.film().window().width.div_ceil(FILM_BLOCK))
+        Self::over(runner.film().padded_pixels(), runner.film().window.width.div_ceil(FILM_BLOCK))
     }
 
     /// The blocks of so many pixels in so many columns.

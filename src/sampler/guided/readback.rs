@@ -58,7 +58,7 @@ impl Guided {
         [x, y]: [u32; 2],
         rays: u32,
     ) -> Result<Option<GuideReadback>> {
-        let window = runner.film().window();
+        let window = runner.film().window;
         let (column, row) = (x.wrapping_sub(window.x), y.wrapping_sub(window.y));
         assert!(column < window.width && row < window.height, "a pixel of the window");
         let per_group = runner.last_group_rays(self.steps());
