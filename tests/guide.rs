@@ -4,7 +4,9 @@
 
 use fenestra::{
     math::random::{hash_4d, random_independent_2d},
-    sampler::guided::{ARRIVAL_DIRECTIONS, CellKey, Guide, decode_entry, decode_visibility},
+    sampler::guided::{
+        ARRIVAL_DIRECTIONS, CellKey, Guide, PARTS_PER_RAY, decode_entry, decode_visibility,
+    },
     sampler::regions::{FACE_COUNT, PARENT_COUNT, Partition, Rectangle, Region},
     scene::environment::{EnvironmentMap, EnvironmentTables},
     shader::{
@@ -404,7 +406,7 @@ fn cells_learn_what_their_surfaces_reflect() {
     let again = Guide::resume(regions, 1 << 12, 1 << 14, &guide.state(), 1);
     assert_eq!(again.state().counts, guide.state().counts);
     assert_eq!(again.snapshot(&partition), guide.snapshot(&partition));
-    assert!(guide.counts(place)[strong].trials_in_rays() <= 65_536.0);
+    assert!(guide.counts(place)[strong].trials <= 65_536 * PARTS_PER_RAY);
 }
 
 /// Four cells: the first sees half of the rays of every region; the second all rays of half of the

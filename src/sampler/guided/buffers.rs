@@ -6,7 +6,7 @@ use bytemuck::Pod;
 
 use super::{
     ARRIVAL_DIRECTIONS, ArrivalWords, CellKey, CountWords, Guide, GuideState, MAX_CELLS, Origin,
-    SHARE_WORDS, Snapshot,
+    PARTS_PER_RAY, SHARE_WORDS, Snapshot,
     arrival_buffers::{self, ArrivalBuffers},
     budget::GuideBudget,
     cell_readback::{CellReadback, RegionReadback},
@@ -269,10 +269,11 @@ impl GuideBuffers {
         let count = self.partition.regions.len();
         let known =
             self.snapshot.entries[index * count..][..count].iter().zip(&self.partition.regions);
+        let rays = |parts: u32| f64::from(parts) / f64::from(PARTS_PER_RAY);
         let regions =
             known.zip(self.learned.counts(index)).map(|((entry, region), count)| RegionReadback {
-                trials: count.trials_in_rays(),
-                hits: count.hits_in_rays(),
+                trials: rays(count.trials),
+                hits: rays(count.hits),
                 visibility: decode_visibility(*entry),
                 probability: f64::from(decode_entry(*entry).0) * region.share,
             });

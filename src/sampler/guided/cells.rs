@@ -14,12 +14,14 @@ pub const MAX_CELLS: usize = 1 << 22;
 /// in for places without a cell of their own.
 #[derive(Clone, Debug)]
 pub struct Cells {
-    capacity: usize,
+    /// Number of cells there is room for.
+    pub(super) capacity: usize,
     slots: usize,
-    keys: Vec<CellKey>,
+    /// Keys of all cells; those of the faces are [`CellKey::NONE`].
+    pub(super) keys: Vec<CellKey>,
     index_of: HashMap<CellKey, usize>,
     /// Fine cells whose children may be cells.
-    refined: Vec<usize>,
+    pub(super) refined: Vec<usize>,
     /// The same by [`CellKey::child_group`].
     refined_by_children: HashMap<u32, usize>,
 }
@@ -157,30 +159,6 @@ impl Cells {
     /// Number of cells, faces included.
     pub fn len(&self) -> usize {
         self.keys.len()
-    }
-
-    /// Number of cells there is room for.
-    pub fn capacity(&self) -> usize {
-        self.capacity
-    }
-
-    /// Changes the number of cells there is room for.
-    ///
-    /// # Panics
-    /// If there are more cells than that.
-    pub fn set_capacity(&mut self, capacity: usize) {
-        assert!(self.keys.len() <= capacity, "{} cells, room for {capacity}", self.keys.len());
-        self.capacity = capacity;
-    }
-
-    /// Keys of all cells; those of the faces are [`CellKey::NONE`].
-    pub fn keys(&self) -> &[CellKey] {
-        &self.keys
-    }
-
-    /// Indices of the refined cells.
-    pub fn refined(&self) -> &[usize] {
-        &self.refined
     }
 
     /// Parent of a cell: a refined cell, else its coarse cell; of a coarse cell its face.

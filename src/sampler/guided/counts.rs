@@ -25,16 +25,6 @@ pub struct Count {
 }
 
 impl Count {
-    /// Rays that reached the environment; a fraction where regions were split.
-    pub fn hits_in_rays(self) -> f64 {
-        f64::from(self.hits) / f64::from(PARTS_PER_RAY)
-    }
-
-    /// Rays traced; a fraction where regions were split.
-    pub fn trials_in_rays(self) -> f64 {
-        f64::from(self.trials) / f64::from(PARTS_PER_RAY)
-    }
-
     /// Adds the fraction `share` of another count, rounded to the nearest unit.
     pub fn add_share(&mut self, other: Self, share: f64) {
         let sum = |count: u32, other: u32| {

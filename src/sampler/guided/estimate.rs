@@ -19,7 +19,7 @@ use crate::sampler::{
 };
 
 /// Weight of the prior of the visibility, in rays.
-const PRIOR_RAYS: f32 = 4.0;
+pub(super) const PRIOR_RAYS: f32 = 4.0;
 /// Weight of the prior of the response, in rays that hit.
 const PRIOR_HITS: f32 = 8.0;
 /// Largest factor by which a parent region raises the prior.
@@ -110,14 +110,9 @@ impl Estimates {
         Self::new(tables.facing[face].iter().map(prior).collect()).updated(tallies, 2.0)
     }
 
-    /// Estimates for a coarse cell, with its face as prior.
-    pub fn of_coarse(tallies: &[Tally], face: &Self) -> Self {
-        face.updated(tallies, PRIOR_RAYS)
-    }
-
     /// Updates `self`, worth `weight` rays, by the tallies. Its responses are first scaled by the
     /// ratio found in all regions together.
-    fn updated(&self, tallies: &[Tally], weight: f32) -> Self {
+    pub(super) fn updated(&self, tallies: &[Tally], weight: f32) -> Self {
         let mut ratio = Ratio::default();
         for (tally, prior) in tallies.iter().zip(&self.regions) {
             ratio.add(tally.response, tally.hits * prior.response);

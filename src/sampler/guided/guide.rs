@@ -118,7 +118,7 @@ impl Guide {
             (FACE_COUNT..self.cells.len()).into_par_iter().filter_map(variance).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         // Leave an eighth for cells that were not seen yet.
-        let capacity = self.cells.capacity();
+        let capacity = self.cells.capacity;
         let room = (capacity - capacity / 8).saturating_sub(self.cells.len());
         for (_, cell) in found.into_iter().take(room / EXPECTED_CHILDREN) {
             self.cells.refine(cell);
@@ -130,7 +130,7 @@ impl Guide {
         let words = |count: &Count| [count.trials, count.hits, count.response];
         GuideState {
             keys: self.keys().iter().map(|key| key.0).collect(),
-            refined: self.cells.refined().iter().map(|&cell| cell as u32).collect(),
+            refined: self.cells.refined.iter().map(|&cell| cell as u32).collect(),
             counts: self.counts.iter().map(words).collect(),
             shares: self.shares.clone(),
             arrivals: self.arriving.as_ref().map(ArrivingLight::words).unwrap_or_default(),
@@ -145,7 +145,7 @@ impl Guide {
 
     /// Keys of all cells; those of the faces are [`CellKey::NONE`].
     pub fn keys(&self) -> &[CellKey] {
-        self.cells.keys()
+        &self.cells.keys
     }
 
     /// Counts of one cell, region by region.
@@ -221,7 +221,8 @@ impl Guide {
     /// # Panics
     /// If there are more cells than that.
     pub fn carry_over(&mut self, from: &Partition, to: &Partition, capacity: usize) {
-        self.cells.set_capacity(capacity);
+        assert!(self.cells.len() <= capacity, "{} cells, room for {capacity}", self.cells.len());
+        self.cells.capacity = capacity;
         let shares = from.shares_in(to);
         let count = to.regions.len();
         let mut counts = vec![Count::default(); self.cells.len() * count];

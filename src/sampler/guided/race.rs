@@ -69,13 +69,6 @@ pub(super) struct Race<'a> {
     pub(super) tag: u32,
 }
 
-/// Result of a race.
-pub(super) struct Outcome {
-    pub(super) arm: Arm,
-    pub(super) costs: Vec<ArmCost>,
-    pub(super) ms: f64,
-}
-
 /// The passes of one arm.
 struct Trial<'a> {
     buffers: &'a GuideBuffers,
@@ -144,14 +137,14 @@ impl Race<'_> {
         runner.waves().capacity() >= SAMPLES * BLOCK_PIXELS
     }
 
-    /// Races `contenders`, of which the first is in use. Forgets the counts since the last rebuild. Fails if
-    /// the device does.
+    /// Races `contenders`, of which the first is in use. Returns the winner, the costs of all and the
+    /// milliseconds it took. Forgets the counts since the last rebuild. Fails if the device does.
     pub(super) fn run(
         self,
         runner: &mut Runner,
         progress: &Progress,
         contenders: &[Arm],
-    ) -> Result<Outcome> {
+    ) -> Result<(Arm, Vec<ArmCost>, f64)> {
         let start = Instant::now();
         let trials: Vec<Trial<'_>> = contenders
             .iter()
@@ -208,7 +201,7 @@ impl Race<'_> {
         let ms = start.elapsed().as_secs_f64() * 1e3;
         let lines: Vec<String> = costs.iter().map(ToString::to_string).collect();
         log::info!("{} by measurement in {ms:.0} ms: {}", contenders[chosen], lines.join("; "));
-        Ok(Outcome { arm: contenders[chosen], costs, ms })
+        Ok((contenders[chosen], costs, ms))
     }
 
     /// Returns the waves of a round, as many as the buffers make necessary. No round has numbers of another

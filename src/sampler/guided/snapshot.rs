@@ -8,7 +8,7 @@ use crate::sampler::{
         cells::Tree,
         counts::Tally,
         entries::{EntryTables, EntryWriter, decode_entry},
-        estimate::{Estimates, RegionTables},
+        estimate::{Estimates, PRIOR_RAYS, RegionTables},
         guide::Guide,
         share::{SHARE_WORDS, ShareEvidence, share_in_256ths},
     },
@@ -90,7 +90,7 @@ impl Guide {
             if cell < FACE_COUNT {
                 Estimates::of_face(cell, tallies, scene, tables)
             } else if self.keys()[cell].is_coarse() {
-                Estimates::of_coarse(tallies, parent)
+                parent.updated(tallies, PRIOR_RAYS)
             } else {
                 Estimates::of_fine(tallies.iter().copied(), parent, tables)
             }

@@ -10,7 +10,7 @@ use super::{
     cost::ArmCost,
     epoch::{TRAINING_SEED, with_arm, with_epoch},
     parameters::AUTO_COHORT_EDGE,
-    race::{Outcome, Race, race_due},
+    race::{Race, race_due},
     state::GuideState,
 };
 use crate::{
@@ -165,15 +165,6 @@ impl Guided {
         self.steps = self.arms.steps(&arm);
     }
 
-    /// Renders by `arm` from so many samples per pixel on.
-    fn take_arm(&mut self, arm: Arm, since: u32) {
-        if arm != self.choice.arm {
-            self.choice.arm = arm;
-            self.choice.since = since;
-            self.steps = self.arms.steps(&arm);
-        }
-    }
-
     /// Returns the candidates per shadow ray; `None` while nothing is measured, and where it is not guided.
     fn candidates(&self) -> Option<u32> {
         let Choice { arm, races, .. } = &self.choice;
@@ -192,10 +183,13 @@ impl Guided {
                 continue;
             }
             let race = Race { buffers: &self.buffers, arms: &self.arms, tag: self.tag };
-            let Outcome { arm, costs, ms } = race.run(runner, progress, &contenders)?;
+            let (arm, costs, ms) = race.run(runner, progress, &contenders)?;
             self.choice.ms += ms;
             self.choice.costs.extend(costs);
-            self.take_arm(arm, samples);
+            if arm != self.choice.arm {
+                (self.choice.arm, self.choice.since) = (arm, samples);
+                self.steps = self.arms.steps(&arm);
+            }
         }
         Ok(())
     }
