@@ -11,7 +11,7 @@ use fenestra::{
         Window,
         checkpoint::checkpoint_path,
         merge::{Part, join_windows, merge_checkpoints, merge_images},
-        png,
+        picture::write_preview,
         sums::Ahead,
     },
     math::colour::display_from_linear,
@@ -619,7 +619,7 @@ fn previews_apply_exposure_and_the_srgb_curve() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("preview.png");
     let picture = RgbImage { width: 2, height: 1, pixels: vec![[0.25, 0.5, 1.0], [0.0; 3]] };
-    png::write_preview(&path, &picture, 1.0).unwrap();
+    write_preview(&path, &picture, 1.0).unwrap();
     let read = image::open(&path).unwrap().into_rgb8();
     assert_eq!(read.dimensions(), (2, 1));
     assert_eq!(read.into_raw(), [188, 255, 255, 0, 0, 0]);

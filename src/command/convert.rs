@@ -7,10 +7,9 @@ use crate::{
     error::{Error, Result},
     files::{check_replaces_nothing, check_writable, extension},
     film::{
-        Curve, Image, RgbImage, Tone, Window,
+        Curve, Image, Tone, Window,
         denoised::DENOISED,
-        picture::{write_hdr, write_jpeg},
-        png::write_rgb8,
+        picture::{write_hdr, write_jpeg, write_png},
         tone::auto_exposure,
     },
     gpu::Denoiser,
@@ -101,12 +100,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             picture.pixels.iter_mut().for_each(|pixel| *pixel = pixel.map(half));
         }
         let tone = Tone { exposure, curve: arguments.curve.unwrap_or_default() };
-        let shown: Vec<[u8; 3]> = picture.pixels.iter().map(|pixel| tone.display(*pixel)).collect();
-        let RgbImage { width, height, .. } = picture;
-        return match kind.as_str() {
-            "png" => write_rgb8(output, width, height, &shown),
-            _ => write_jpeg(output, width, height, &shown),
-        };
+        let write = if kind == "png" { write_png } else { write_jpeg };
+        return write(output, picture.width, &tone.shown(&picture));
     }
     let scale = exposure.exp2();
     picture.pixels.iter_mut().for_each(|pixel| *pixel = pixel.map(|value| value * scale));

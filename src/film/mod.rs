@@ -1,7 +1,7 @@
 //! The film: sums of samples on their way to files.
 //!
 //! The device accumulates [`Sums`] over `n` samples of every pixel. They become the image file
-//! ([`Sums::to_image`] → [`Image::write_exr`]), the preview ([`png`]) and the [`Checkpoint`], from
+//! ([`Sums::to_image`] → [`Image::write_exr`]), the preview ([`picture`]) and the [`Checkpoint`], from
 //! which a render continues bit for bit. Every file carries the [`Metadata`] of its render.
 
 pub mod checkpoint;
@@ -14,7 +14,6 @@ pub mod layers;
 pub mod merge;
 pub mod metadata;
 pub mod picture;
-pub mod png;
 pub(crate) mod reconstruction;
 pub mod sky;
 pub mod statistics;

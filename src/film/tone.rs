@@ -1,5 +1,6 @@
 //! Tone: linear radiance → values that a screen can show; twin of `glsl/include/tone.glsl`.
 
+use super::RgbImage;
 use crate::math::colour::{display_from_linear, luminance};
 
 /// Luminance that [`auto_exposure`] gives to the middle of a picture.
@@ -34,8 +35,13 @@ pub struct Tone {
 }
 
 impl Tone {
+    /// Maps a linear picture to bytes.
+    pub(crate) fn shown(&self, picture: &RgbImage) -> Vec<[u8; 3]> {
+        picture.pixels.iter().map(|pixel| self.display(*pixel)).collect()
+    }
+
     /// Maps a linear pixel to bytes. NaN becomes 0.
-    pub(crate) fn display(&self, pixel: [f32; 3]) -> [u8; 3] {
+    fn display(&self, pixel: [f32; 3]) -> [u8; 3] {
         let scale = self.exposure.exp2();
         let scaled = pixel.map(|value| value * scale);
         let mapped = match self.curve {

@@ -17,7 +17,7 @@ use super::{
 use crate::{
     brdf::{self, MaterialTables},
     error::Result,
-    film::{png::write_rgb8, sky::white},
+    film::{picture::write_png, sky::white},
     math::colour::{display_from_linear, luminance},
     scene::EnvironmentMap,
     srbf::{kernel_value, lobe_value},
@@ -86,7 +86,7 @@ fn write(path: &Path, stack: &[Panels]) -> Result<()> {
         rows.extend(panels.rows());
     }
     let width = rows.first().map_or(0, Vec::len) as u32;
-    write_rgb8(path, width, rows.len() as u32, &rows.concat())
+    write_png(path, width, &rows.concat())
 }
 
 /// Writes the picture of a fitted map as PNG, in the frame of the map. Fails with [`crate::Error::Io`] and

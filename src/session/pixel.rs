@@ -18,7 +18,7 @@ use super::{Renderer, Settings};
 use crate::{
     error::{Error, Result},
     files::{check_writable, write_text},
-    film::{Window, png::write_rgb8},
+    film::{Window, picture::write_png},
     gpu::{Buffer, Device},
     pass::{
         BLOCK_PIXELS, Explanation, PixelReadback, Progress, RayReadback, SceneBuffers,
@@ -83,7 +83,7 @@ pub fn write(
         rows.extend(std::iter::repeat_n([255; 3], GAP * WIDTH));
         rows.extend(sky.pixels());
     }
-    write_rgb8(&path, WIDTH as u32, (rows.len() / WIDTH) as u32, &rows)?;
+    write_png(&path, WIDTH as u32, &rows)?;
     let numbers = path.with_extension("json");
     write_text(&numbers, &explanation.numbers().to_string())?;
     Ok([path, numbers])

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use super::statistics::percentile;
-use crate::{error::Result, film::png};
+use crate::{error::Result, film::picture::write_png};
 
 /// Values at the two ends of the colour map; values outside take the colour of the end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,7 +112,7 @@ impl Canvas {
     /// # Errors
     /// [`crate::Error::Io`] with the cause.
     pub(crate) fn write_png(&self, path: &Path) -> Result<()> {
-        png::write_rgb8(path, self.width as u32, self.height as u32, &self.pixels)
+        write_png(path, self.width as u32, &self.pixels)
     }
 }
 

@@ -15,7 +15,7 @@ use crate::{
     film::{
         Aov, Image, Metadata, SampleRange,
         checkpoint::{checkpoint_path, remove_checkpoint},
-        png::write_preview,
+        picture::write_preview,
     },
     scene::Scene,
     session::{Rules, Session, describe},

@@ -14,7 +14,7 @@ use crate::{
     error::Result,
     film::{
         Image,
-        png::{preview, write_preview},
+        picture::{preview, write_preview},
     },
     scene::Scene,
     session::{Figures, Rules, Session},

@@ -98,7 +98,11 @@ impl Panel {
             Input::Key(Action::Exposure(stops)) => self.change(|tone| tone.exposure += stops),
             Input::Set(Setting::Exposure(stops)) => self.change(|tone| tone.exposure = stops),
             Input::Set(Setting::Curve(curve)) => self.change(|tone| tone.curve = curve),
-            Input::Key(Action::AutoExposure) => self.expose(),
+            Input::Key(Action::AutoExposure) if self.layer == SHOW_PICTURE => {
+                let shown = self.projector.shown(Place::Left);
+                shown.and_then(|shown| self.change(|tone| tone.exposure = auto_exposure(&shown)))
+            }
+            Input::Key(Action::AutoExposure) => self.present(),
             Input::Key(Action::Curve) => {
                 let all = crate::film::Curve::ALL;
                 let now = all.iter().position(|curve| *curve == self.tone.curve).unwrap_or(0);
@@ -139,15 +143,6 @@ impl Panel {
         self.failure.take().map_or(Ok(()), Err)
     }
 
-    /// Sets the exposure by the picture to the left.
-    fn expose(&mut self) -> Result<()> {
-        if self.layer == SHOW_PICTURE {
-            self.tone.exposure = auto_exposure(&self.projector.shown(Place::Left)?);
-            self.is_changed = true;
-        }
-        self.present()
-    }
-
     /// Shows what the projector has. Fails if the device does or the window is gone.
     pub(crate) fn present(&mut self) -> Result<()> {
         // Twice: a window may change its size or lose its surface once in between.
@@ -172,9 +167,9 @@ impl Panel {
         Ok(())
     }
 
-    /// Returns what the window shows without controls: its size, and red, green, blue of each pixel. Fails
+    /// Returns what the window shows without controls: its width, and red, green, blue of each pixel. Fails
     /// if the device does.
-    pub(crate) fn picture(&mut self) -> Result<([u32; 2], Vec<[u8; 3]>)> {
+    pub(crate) fn picture(&mut self) -> Result<(u32, Vec<[u8; 3]>)> {
         let mut size = self.swapchain.size();
         if size.contains(&0) {
             return Err(Error::usage("the window has no pixels to write"));
@@ -184,7 +179,7 @@ impl Panel {
         let pixels = self.compose(size, false)?;
         let pixels: Vec<[u8; 4]> = pixels.download(size[0] as usize * size[1] as usize)?;
         self.projector.set_overlay(overlay)?;
-        Ok((size, pixels.into_iter().map(|[red, green, blue, _]| [red, green, blue]).collect()))
+        Ok((size[0], pixels.into_iter().map(|[red, green, blue, _]| [red, green, blue]).collect()))
     }
 
     fn compose(&mut self, size: [u32; 2], is_bgra: bool) -> Result<Buffer> {

@@ -5,7 +5,7 @@ use std::{fmt::Write, path::PathBuf};
 use crate::{
     error::Result,
     files::write_text,
-    film::{Image, png::write_rgb8},
+    film::{Image, picture::write_png},
     scene::Camera,
 };
 
@@ -46,15 +46,15 @@ pub(super) fn views(scene: &str) -> Vec<PathBuf> {
     (1..=MOST_VIEWS).map(of).filter(|file| file.exists()).collect()
 }
 
-/// Writes size and pixels of the window, the film to the left with its metadata, and the camera. Fails with
+/// Writes width and pixels of the window, the film to the left with its metadata, and the camera. Fails with
 /// [`crate::Error::Io`] and the cause.
 pub(super) fn write(
     [png, exr, toml]: &[PathBuf; 3],
-    (size, pixels): ([u32; 2], &[[u8; 3]]),
+    (width, pixels): (u32, &[[u8; 3]]),
     film: &Image,
     camera: &Camera,
 ) -> Result<()> {
-    write_rgb8(png, size[0], size[1], pixels)?;
+    write_png(png, width, pixels)?;
     film.write_exr(exr)?;
     write_text(toml, &camera_toml(camera))
 }

@@ -10,7 +10,7 @@ use crate::{
     film::{
         Attribute, Image,
         checkpoint::{checkpoint_path, remove_checkpoint},
-        png::write_preview,
+        picture::write_preview,
     },
     gpu::Denoiser,
     session::Session,

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::film::{Sums, png::write_preview};
+use crate::film::{Sums, picture::write_preview};
 
 /// Most of the time that previews may take: one in so many parts.
 const SHARE: u32 = 20;

@@ -7,7 +7,10 @@ use half::f16;
 
 use crate::{
     error::{Error, Result},
-    film::{Image, RgbImage, png},
+    film::{
+        Image, RgbImage,
+        picture::{encode_png, preview},
+    },
     study::{
         falsecolour::{self, Scale},
         folder::Folder,
@@ -136,7 +139,7 @@ pub fn load(
     let scale = Scale::of(&maps.iter().flat_map(on_surfaces).collect::<Vec<f64>>());
     for ((picture, map), path) in pictures[1..].iter_mut().zip(&maps).zip(&error_paths) {
         let colours: Vec<[u8; 3]> = map.iter().map(|error| scale.colour(*error)).collect();
-        picture.error = data_uri(mean.width, mean.height, &colours)?;
+        picture.error = data_uri(mean.width, &colours)?;
         falsecolour::picture(map, mean.width as usize, scale).write_png(path)?;
     }
     let worth = worth_seeing(&maps, report.order.len(), &is_shown);
@@ -171,12 +174,12 @@ fn halves(picture: &RgbImage) -> String {
 }
 
 fn display_uri(picture: &RgbImage, stops: f32) -> Result<String> {
-    data_uri(picture.width, picture.height, &png::preview(picture, stops))
+    data_uri(picture.width, &preview(picture, stops))
 }
 
-fn data_uri(width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<String> {
+fn data_uri(width: u32, pixels: &[[u8; 3]]) -> Result<String> {
     let mut bytes = Vec::new();
-    png::encode_rgb8(&mut bytes, width, height, pixels)
+    encode_png(&mut bytes, width, pixels)
         .map_err(|error| Error::comparison(format!("a picture of the page: {error}")))?;
     Ok(format!("data:image/png;base64,{}", BASE64_STANDARD.encode(&bytes)))
 }

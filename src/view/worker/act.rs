@@ -263,10 +263,10 @@ impl Worker {
             self.saves_at_rest = true;
             return Ok(());
         }
-        let (size, pixels) = self.parts.panel.borrow_mut().picture()?;
+        let (width, pixels) = self.parts.panel.borrow_mut().picture()?;
         let film = self.parts.left.session.image(&[])?;
         let files = names(&self.parts.scene.name);
-        let written = write(&files, (size, &pixels), &film, &self.rig.camera);
+        let written = write(&files, (width, &pixels), &film, &self.rig.camera);
         self.notice_written(written, &files);
         Ok(())
     }
