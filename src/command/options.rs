@@ -182,21 +182,4 @@ mod tests {
             assert!(parse_point(wrong).is_err(), "{wrong}");
         }
     }
-
-    #[test]
-    fn pixels_have_two_coordinates() {
-        assert_eq!(parse_pixel("12, 7"), Ok([12, 7]));
-        for wrong in ["", "1", "1,2,3", "-1,2", "1.5,2", "a,b"] {
-            assert!(parse_pixel(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
-    fn crops_are_not_empty() {
-        let window = Window { x: 1, y: 2, width: 10, height: 20 };
-        assert_eq!(parse_crop("1,2,11,22"), Ok(window));
-        for wrong in ["", "1,2,3", "1,2,1,22", "5,2,1,22", "1,2,3,4,5", "a,b,c,d"] {
-            assert!(parse_crop(wrong).is_err(), "{wrong}");
-        }
-    }
 }
