@@ -31,8 +31,8 @@ fn mse_rmse_mae_and_largest_error() {
     let (x, r) = example();
     let metrics = against(&x, &r).unwrap();
     // (2/3 + 4/3)/2; absolute errors 1, 0, 1, 0, 0, 2 over six.
-    assert_eq!(metrics.mse, 1.0);
-    assert_eq!(metrics.rmse, 1.0);
+    assert_eq!(metrics.errors.mse, 1.0);
+    assert_eq!(metrics.errors.rmse, 1.0);
     assert_eq!(metrics.mae, 4.0 / 6.0);
     assert_eq!(metrics.max_error, 2.0);
 }
@@ -68,7 +68,7 @@ fn relmse_divides_by_the_filtered_reference() {
     let (x, r) = example();
     // Both windows hold both pixels: L = 2 = L̄, and the denominator is 4 + 0.04.
     let expected = (2.0 / 3.0 + 4.0 / 3.0) / 2.0 / 4.04;
-    assert!((against(&x, &r).unwrap().relmse - expected).abs() < 1e-15);
+    assert!((against(&x, &r).unwrap().errors.relmse - expected).abs() < 1e-15);
     let relative = relative_squared_errors(&x, &r, &r).unwrap();
     // (1 + 0 + 1)/3 and (0 + 0 + 4)/3.
     for (found, squared) in relative.iter().zip([2.0 / 3.0, 4.0 / 3.0]) {
@@ -102,8 +102,8 @@ fn relmse_filter_is_five_pixels_wide_and_ends_at_the_border() {
 #[test]
 fn relmse_of_a_black_reference_is_infinite_unless_the_picture_is_black() {
     let black = picture(1, &[[0.0; 3]]);
-    assert_eq!(against(&black, &black).unwrap().relmse, 0.0);
-    assert_eq!(against(&picture(1, &[[1.0; 3]]), &black).unwrap().relmse, f64::INFINITY);
+    assert_eq!(against(&black, &black).unwrap().errors.relmse, 0.0);
+    assert_eq!(against(&picture(1, &[[1.0; 3]]), &black).unwrap().errors.relmse, f64::INFINITY);
 }
 
 #[test]
@@ -116,17 +116,17 @@ fn trimming_drops_one_pixel_in_a_thousand() {
     pixels[7] = [21.0; 3];
     pixels[1999] = [31.0; 3];
     let metrics = against(&picture(50, &pixels), &reference).unwrap();
-    assert!((metrics.relmse_trimmed - (1997.0 + 100.0) / 1998.0 / 1.01).abs() < 1e-12);
+    assert!((metrics.errors.relmse_trimmed - (1997.0 + 100.0) / 1998.0 / 1.01).abs() < 1e-12);
     let all = (1997.0 + 100.0 + 400.0 + 900.0) / 2000.0 / 1.01;
-    assert!((metrics.relmse - all).abs() < 1e-12);
+    assert!((metrics.errors.relmse - all).abs() < 1e-12);
     // The third largest of 2000 is the least value that 99.9% do not exceed.
-    assert!((metrics.relmse_p999 - 100.0 / 1.01).abs() < 1e-12);
-    assert!((metrics.relmse_max - 900.0 / 1.01).abs() < 1e-12);
+    assert!((metrics.errors.relmse_p999 - 100.0 / 1.01).abs() < 1e-12);
+    assert!((metrics.errors.relmse_max - 900.0 / 1.01).abs() < 1e-12);
     // Below a thousand pixels nothing is dropped.
     let (x, r) = example();
     let small = against(&x, &r).unwrap();
-    assert_eq!(small.relmse_trimmed, small.relmse);
-    assert_eq!([small.relmse_p999, small.relmse_max], [4.0 / 3.0 / 4.04; 2]);
+    assert_eq!(small.errors.relmse_trimmed, small.errors.relmse);
+    assert_eq!([small.errors.relmse_p999, small.errors.relmse_max], [4.0 / 3.0 / 4.04; 2]);
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn the_percentile_is_the_nearest_rank() {
         let values = (1..=count).map(|value| [f32::from(value).sqrt() + 1.0; 3]);
         let pixels: Vec<[f32; 3]> = values.collect();
         let reference = picture(1, &vec![[1.0; 3]; pixels.len()]);
-        1.01 * against(&picture(1, &pixels), &reference).unwrap().relmse_p999
+        1.01 * against(&picture(1, &pixels), &reference).unwrap().errors.relmse_p999
     };
     for (count, rank) in [(1, 1.0), (999, 999.0), (1000, 999.0), (1999, 1998.0), (2000, 1998.0)] {
         let found = percentile(count);
@@ -149,11 +149,11 @@ fn two_halves_take_the_product_of_the_differences() {
     // x = 2, r₁ = 1, r₂ = 4: (2 − 1)(2 − 4) = −2; the mean reference is 2.5.
     let [x, first, second] = [2.0, 1.0, 4.0].map(|value| picture(1, &[[value; 3]]));
     let metrics = Metrics::of_halves(&x, &first, &second).unwrap();
-    assert_eq!(metrics.mse, -2.0);
-    assert_eq!(metrics.rmse, 0.0);
+    assert_eq!(metrics.errors.mse, -2.0);
+    assert_eq!(metrics.errors.rmse, 0.0);
     assert_eq!(metrics.mae, 0.5);
     assert_eq!(metrics.mean_ratio, 0.8);
-    assert!((metrics.relmse - -2.0 / (6.25 * 1.01)).abs() < 1e-15);
+    assert!((metrics.errors.relmse - -2.0 / (6.25 * 1.01)).abs() < 1e-15);
 }
 
 #[test]
@@ -174,8 +174,8 @@ fn two_halves_are_free_of_the_references_noise() {
         .collect();
     let plain = against(&exact, &picture(100, &means)).unwrap();
     // Standard error of the product's mean is 1/12/√10000 = 8e-4.
-    assert!(halves.mse.abs() < 5.0 * 8.4e-4, "{}", halves.mse);
-    assert!((plain.mse - 1.0 / 24.0).abs() < 3e-3, "{}", plain.mse);
+    assert!(halves.errors.mse.abs() < 5.0 * 8.4e-4, "{}", halves.errors.mse);
+    assert!((plain.errors.mse - 1.0 / 24.0).abs() < 3e-3, "{}", plain.errors.mse);
 }
 
 #[test]

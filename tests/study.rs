@@ -569,7 +569,7 @@ fn references_can_be_given() {
         Image::read_exr(&path).unwrap().rgb(&path).unwrap()
     });
     let halves = Metrics::of_halves(&a, &b, &b).unwrap();
-    for (name, difference) in [("mse", halves.mse), ("relmse", halves.relmse)] {
+    for (name, difference) in [("mse", halves.errors.mse), ("relmse", halves.errors.relmse)] {
         let found = own[name].as_f64().unwrap();
         assert!((found / (0.25 * difference) - 1.0).abs() < 1e-6, "{name}: {found} {difference}");
     }

@@ -52,7 +52,7 @@ fn main() -> Result<()> {
         let relmse = |session: &mut Session| -> Result<f64> {
             let picture = render(session, seed, SPP)?;
             // Without the worst 0.1% of the pixels: a single bright one can outweigh all others.
-            Ok(Metrics::of_halves(&picture, &halves[0], &halves[1])?.relmse_trimmed)
+            Ok(Metrics::of_halves(&picture, &halves[0], &halves[1])?.errors.relmse_trimmed)
         };
         let errors = [relmse(&mut first)?, relmse(&mut second)?];
         let ratio = errors[0] / errors[1];

@@ -207,7 +207,7 @@ impl Study<'_> {
                     rule.describe(),
                     last.spp,
                     last.seconds,
-                    last.rmse
+                    last.errors.rmse
                 ));
             }
             results.runs.push(run);

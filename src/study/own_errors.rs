@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::metrics::parts::PartErrors;
+use super::metrics::{Errors, parts::PartErrors};
 
 /// A run is judged if its mean squared error is at least this many times the reference's own.
 pub(crate) const JUDGED_FROM: f64 = 4.0;
@@ -26,6 +26,14 @@ pub struct OwnErrors {
     pub mean: f64,
     /// Standard error of that mean, an upper estimate; absent if the files have no variances.
     pub mean_standard_error: Option<f64>,
+}
+
+impl OwnErrors {
+    /// Tests whether both relative errors stand out of the reference's own.
+    pub(crate) fn judges_relative(&self, errors: &Errors) -> bool {
+        is_judged(errors.relmse, self.relmse)
+            && is_judged(errors.relmse_trimmed, self.relmse_trimmed)
+    }
 }
 
 /// A reference's own errors over lit surfaces and over the environment seen directly.

@@ -40,8 +40,8 @@ impl Figure {
 
     pub(crate) fn of(self, measurement: &Measurement) -> f64 {
         match self {
-            Self::Relmse => measurement.relmse,
-            Self::RelmseTrimmed => measurement.relmse_trimmed,
+            Self::Relmse => measurement.errors.relmse,
+            Self::RelmseTrimmed => measurement.errors.relmse_trimmed,
         }
     }
 }
@@ -220,6 +220,7 @@ mod tests {
     use super::*;
     use crate::session::Figures;
     use crate::study::{
+        metrics::Errors,
         own_errors::OwnErrors,
         plan::{Description, Options, Rule},
         runs::Conditions,
@@ -272,8 +273,11 @@ mod tests {
             Measurement {
                 spp: 1 << exponent,
                 seconds,
-                relmse: scale / seconds,
-                relmse_trimmed: 0.5 * scale / seconds,
+                errors: Errors {
+                    relmse: scale / seconds,
+                    relmse_trimmed: 0.5 * scale / seconds,
+                    ..Errors::default()
+                },
                 ..Measurement::default()
             }
         };

@@ -188,9 +188,9 @@ impl Reference {
         }
         if last > 0 {
             let halves = Metrics::of_halves(&first, &second, &second)?;
-            own.mse = Some(0.25 * halves.mse);
-            own.relmse = Some(0.25 * halves.relmse);
-            own.relmse_trimmed = Some(0.25 * halves.relmse_trimmed);
+            own.mse = Some(0.25 * halves.errors.mse);
+            own.relmse = Some(0.25 * halves.errors.relmse);
+            own.relmse_trimmed = Some(0.25 * halves.errors.relmse_trimmed);
         } else if let Some(variances) = &variances {
             let sum: f64 = variances[0].iter().flatten().map(|value| f64::from(*value)).sum();
             own.mse = Some(sum / (3.0 * variances[0].len() as f64));

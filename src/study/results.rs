@@ -217,12 +217,12 @@ fn columns(runs: &[Run]) -> Vec<Column> {
     }));
     columns.extend([
         column("visible_share", |run, _, _| optional(run.figures.visible_share)),
-        column("rmse", |_, _, m| m.rmse.to_string()),
-        column("mse", |_, _, m| m.mse.to_string()),
-        column("relmse", |_, _, m| m.relmse.to_string()),
-        column("relmse_trimmed", |_, _, m| m.relmse_trimmed.to_string()),
-        column("relmse_p999", |_, _, m| m.relmse_p999.to_string()),
-        column("relmse_max", |_, _, m| m.relmse_max.to_string()),
+        column("rmse", |_, _, m| m.errors.rmse.to_string()),
+        column("mse", |_, _, m| m.errors.mse.to_string()),
+        column("relmse", |_, _, m| m.errors.relmse.to_string()),
+        column("relmse_trimmed", |_, _, m| m.errors.relmse_trimmed.to_string()),
+        column("relmse_p999", |_, _, m| m.errors.relmse_p999.to_string()),
+        column("relmse_max", |_, _, m| m.errors.relmse_max.to_string()),
         column("mean_ratio", |_, _, m| m.mean_ratio.to_string()),
         column("mean_deviation", |_, _, m| optional(m.mean_deviation)),
         column("mse_judged", |_, _, m| m.mse_judged.to_string()),

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     contender::Contender,
-    metrics::Metrics,
+    metrics::{Errors, Metrics},
     own_errors::{OwnErrors, OwnParts, is_judged},
     plan::Rule,
     reference::Reference,
@@ -101,18 +101,9 @@ pub struct Measurement {
     pub gpu_seconds: f64,
     /// Rays of every kind so far.
     pub rays: u64,
-    /// Mean squared error; may be negative, see [`super::metrics`].
-    pub mse: f64,
-    /// Its root, 0 if it is negative.
-    pub rmse: f64,
-    /// Mean relative squared error.
-    pub relmse: f64,
-    /// The same without the worst 0.1% of the pixels.
-    pub relmse_trimmed: f64,
-    /// 99.9th percentile of the pixels' relative squared errors.
-    pub relmse_p999: f64,
-    /// Their largest.
-    pub relmse_max: f64,
+    /// Errors over all pixels; they may be negative, see [`super::metrics`].
+    #[serde(flatten)]
+    pub errors: Errors,
     /// Mean of the picture over that of the reference.
     pub mean_ratio: f64,
     /// Difference of the two means in its standard errors; absent below two samples, or if the
@@ -160,20 +151,14 @@ impl Measurement {
             seconds: session.seconds(),
             gpu_seconds: totals.gpu_ms.values().sum::<f64>() * 1e-3,
             rays: totals.rays(),
-            mse: metrics.mse,
-            rmse: metrics.rmse,
-            relmse: metrics.relmse,
-            relmse_trimmed: metrics.relmse_trimmed,
-            relmse_p999: metrics.relmse_p999,
-            relmse_max: metrics.relmse_max,
+            errors: metrics.errors,
             mean_ratio: metrics.mean_ratio,
             mean_deviation: error.zip(own.mean_standard_error).map(|(error, theirs)| {
                 let deviation = (metrics.mean_ratio - 1.0) * own.mean;
                 deviation / error.hypot(theirs).max(f64::MIN_POSITIVE)
             }),
-            mse_judged: is_judged(metrics.mse, own.mse),
-            relmse_judged: is_judged(metrics.relmse, own.relmse)
-                && is_judged(metrics.relmse_trimmed, own.relmse_trimmed),
+            mse_judged: is_judged(metrics.errors.mse, own.mse),
+            relmse_judged: own.judges_relative(&metrics.errors),
             parts: surfaces.errors(&picture, reference)?,
             flip: None,
             image: None,

@@ -11,7 +11,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{MeanReference, RADIUS, RELATIVE_FLOOR, RelativeErrors, mean_picture, squared_errors};
+use super::{Errors, MeanReference, RADIUS, RELATIVE_FLOOR, mean_picture, squared_errors};
 use crate::{error::Result, film::RgbImage};
 
 /// Share of a part's pixels that are not brighter than the limit of its mean.
@@ -49,9 +49,10 @@ impl PartErrors {
         let relative = |(index, error): &(usize, f64)| {
             if *error == 0.0 { 0.0 } else { error / denominators[*index] }
         };
-        let mse = errors.iter().map(|(_, error)| error).sum::<f64>() / errors.len() as f64;
-        let relative = RelativeErrors::of(errors.iter().map(relative).collect());
-        Ok(Some(Self { mse, relmse: relative.mean, relmse_trimmed: relative.trimmed }))
+        let relative = errors.iter().map(relative).collect();
+        let Errors { mse, relmse, relmse_trimmed, .. } =
+            Errors::of(errors.iter().map(|(_, error)| *error), relative);
+        Ok(Some(Self { mse, relmse, relmse_trimmed }))
     }
 
     /// Computes each figure, given the function that takes it from errors.
@@ -117,7 +118,11 @@ mod tests {
         assert!((part.relmse - 0.01 / 1.01).abs() < 1e-6, "{part:?}");
         assert!((part.mse - 0.01).abs() < 1e-6, "{part:?}");
         let whole = Metrics::of_halves(&picture, &reference, &reference).unwrap();
-        assert!(whole.relmse < 1e-2 * part.relmse, "the sun hides it in {}", whole.relmse);
+        assert!(
+            whole.errors.relmse < 1e-2 * part.relmse,
+            "the sun hides it in {}",
+            whole.errors.relmse
+        );
     }
 
     #[test]
@@ -138,8 +143,8 @@ mod tests {
         let halves = [&reference, &reference];
         let part = PartErrors::of_halves(&picture, halves, &[true; 400]).unwrap().unwrap();
         let whole = Metrics::of_halves(&picture, &reference, &reference).unwrap();
-        assert!((part.relmse - whole.relmse).abs() < 1e-12);
-        assert!((part.relmse_trimmed - whole.relmse_trimmed).abs() < 1e-12);
+        assert!((part.relmse - whole.errors.relmse).abs() < 1e-12);
+        assert!((part.relmse_trimmed - whole.errors.relmse_trimmed).abs() < 1e-12);
         assert_eq!(PartErrors::of_halves(&picture, halves, &[false; 400]).unwrap(), None);
     }
 }

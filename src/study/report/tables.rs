@@ -235,7 +235,7 @@ fn judged_cell(value: f64, is_judged: bool) -> String {
 }
 
 fn rmse_cell(summary: &Summary) -> String {
-    judged_cell(summary.rmse, summary.mse_judged)
+    judged_cell(summary.errors.rmse, summary.mse_judged)
 }
 
 /// Head of a column, and the function that formats its cell in a row.
@@ -270,11 +270,11 @@ pub fn figures(report: &Report, scene: &str) -> String {
         ("samples", &|s| count(s.spp)),
         ("seconds", &|s| number(s.seconds, 3)),
         ("RMSE", &rmse_cell),
-        ("MSE", &|s| judged_cell(s.mse, s.mse_judged)),
-        ("relMSE", &|s| relative(s, s.relmse)),
-        ("relMSE,<br>trimmed", &|s| relative(s, s.relmse_trimmed)),
-        ("relMSE,<br>99.9%", &|s| relative(s, s.relmse_p999)),
-        ("relMSE,<br>largest", &|s| relative(s, s.relmse_max)),
+        ("MSE", &|s| judged_cell(s.errors.mse, s.mse_judged)),
+        ("relMSE", &|s| relative(s, s.errors.relmse)),
+        ("relMSE,<br>trimmed", &|s| relative(s, s.errors.relmse_trimmed)),
+        ("relMSE,<br>99.9%", &|s| relative(s, s.errors.relmse_p999)),
+        ("relMSE,<br>largest", &|s| relative(s, s.errors.relmse_max)),
         ("relMSE,<br>surfaces", &|s| on_surfaces(s, |part| part.relmse)),
         ("trimmed,<br>surfaces", &|s| on_surfaces(s, |part| part.relmse_trimmed)),
         ("MSE,<br>environment", &|s| s.parts.environment.map_or("–".to_owned(), on_environment)),

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::{
-    metrics::parts::PartErrors,
+    metrics::{Errors, parts::PartErrors},
     own_errors::is_judged,
     plan::{Plan, Rule},
     runs::{Measurement, Run, StudiedScene},
@@ -34,18 +34,9 @@ pub struct Summary {
     pub seconds: f64,
     /// Mean device time of the passes, seconds.
     pub gpu_seconds: f64,
-    /// Mean of the mean squared errors.
-    pub mse: f64,
-    /// Its root.
-    pub rmse: f64,
-    /// Mean of the mean relative squared errors.
-    pub relmse: f64,
-    /// The same without the worst 0.1% of the pixels of each run.
-    pub relmse_trimmed: f64,
-    /// Mean of the 99.9th percentiles of the pixels' relative squared errors.
-    pub relmse_p999: f64,
-    /// Mean of the pixels' largest relative squared errors.
-    pub relmse_max: f64,
+    /// Means of the errors of the runs, and the root of the mean squared error.
+    #[serde(flatten)]
+    pub errors: Errors,
     /// True if `mse` passes [`is_judged`].
     pub mse_judged: bool,
     /// True if both relative errors pass it.
@@ -137,6 +128,20 @@ fn means(
     names.into_iter().map(|name| (name.clone(), mean_of(name))).collect()
 }
 
+/// Means over the seeds of the errors over all pixels.
+fn mean_errors(own: &[(&Run, &Measurement)]) -> Errors {
+    let average = |error: fn(&Errors) -> f64| mean(own.iter().map(|(_, m)| error(&m.errors)));
+    let mse = average(|errors| errors.mse);
+    Errors {
+        mse,
+        rmse: mse.max(0.0).sqrt(),
+        relmse: average(|errors| errors.relmse),
+        relmse_trimmed: average(|errors| errors.relmse_trimmed),
+        relmse_p999: average(|errors| errors.relmse_p999),
+        relmse_max: average(|errors| errors.relmse_max),
+    }
+}
+
 /// Means over the seeds of the errors in both parts of the picture.
 fn mean_parts(own: &[(&Run, &Measurement)], scene: &StudiedScene) -> Parts {
     let surfaces = mean_of_parts(own.iter().map(|(_, m)| m.parts.surfaces));
@@ -155,19 +160,10 @@ fn summary(
 ) -> Summary {
     let average = |value: &dyn Fn(&Measurement) -> f64| mean(own.iter().map(|(_, m)| value(m)));
     let reference = scene.reference.clone().unwrap_or_default();
-    let mse = average(&|m| m.mse);
-    let (relmse, relmse_trimmed) = (average(&|m| m.relmse), average(&|m| m.relmse_trimmed));
-    let mse_judged = is_judged(mse, reference.mse);
-    let baseline_mse = mean(baseline.iter().map(|(_, m)| m.mse));
-    let both_judged = mse_judged && is_judged(baseline_mse, reference.mse);
-    let baseline_relative = [
-        mean(baseline.iter().map(|(_, m)| m.relmse)),
-        mean(baseline.iter().map(|(_, m)| m.relmse_trimmed)),
-    ];
-    let is_relative_judged = |[relmse, relmse_trimmed]: [f64; 2]| {
-        is_judged(relmse, reference.relmse) && is_judged(relmse_trimmed, reference.relmse_trimmed)
-    };
-    let relmse_judged = is_relative_judged([relmse, relmse_trimmed]);
+    let (errors, others) = (mean_errors(own), mean_errors(baseline));
+    let mse_judged = is_judged(errors.mse, reference.mse);
+    let both_judged = mse_judged && is_judged(others.mse, reference.mse);
+    let relmse_judged = reference.judges_relative(&errors);
     let by_seed = |value: &dyn Fn(&Measurement, &Measurement) -> f64| {
         let ratios: Vec<f64> = own
             .iter()
@@ -191,21 +187,17 @@ fn summary(
         spp: average(&|m| f64::from(m.spp)),
         seconds: average(&|m| m.seconds),
         gpu_seconds: average(&|m| m.gpu_seconds),
-        mse,
-        rmse: mse.max(0.0).sqrt(),
-        relmse,
-        relmse_trimmed,
-        relmse_p999: average(&|m| m.relmse_p999),
-        relmse_max: average(&|m| m.relmse_max),
+        errors,
         mse_judged,
         relmse_judged,
-        rmse_ratio: by_seed(&|ours, theirs| (ours.mse / theirs.mse).sqrt()).filter(|_| both_judged),
+        rmse_ratio: by_seed(&|ours, theirs| (ours.errors.mse / theirs.errors.mse).sqrt())
+            .filter(|_| both_judged),
         relative_ratio: by_seed(&|ours, theirs| {
-            (ours.relmse_trimmed / theirs.relmse_trimmed).sqrt()
+            (ours.errors.relmse_trimmed / theirs.errors.relmse_trimmed).sqrt()
         })
-        .filter(|_| relmse_judged && is_relative_judged(baseline_relative)),
+        .filter(|_| relmse_judged && reference.judges_relative(&others)),
         efficiency: by_seed(&|ours, theirs| {
-            theirs.mse * theirs.seconds / (ours.mse * ours.seconds)
+            theirs.errors.mse * theirs.seconds / (ours.errors.mse * ours.seconds)
         })
         .filter(|_| both_judged),
         parts,
@@ -286,8 +278,8 @@ fn curve(scene: &StudiedScene, sampler: &str, runs: &[&Run]) -> Curve {
         .filter_map(|spp| {
             let at = runs.iter().map(|run| run.measurements.iter().find(|m| m.spp == spp));
             let at: Vec<&Measurement> = at.collect::<Option<_>>()?;
-            let mse = mean(at.iter().map(|measurement| measurement.mse));
-            let single: Vec<f64> = at.iter().map(|m| m.mse.max(0.0).sqrt()).collect();
+            let mse = mean(at.iter().map(|measurement| measurement.errors.mse));
+            let single: Vec<f64> = at.iter().map(|m| m.errors.mse.max(0.0).sqrt()).collect();
             let around = geometric_interval(&single).filter(|_| is_judged(mse, own))?;
             let middle = mse.sqrt();
             let scale = middle / around.middle;

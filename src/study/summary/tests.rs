@@ -30,9 +30,12 @@ fn run(sampler: &str, seed: u32, variance: f64) -> Run {
         spp,
         seconds: 0.1 * f64::from(spp),
         gpu_seconds: 0.09 * f64::from(spp),
-        mse: variance / f64::from(spp),
-        relmse: 1.0,
-        relmse_trimmed: if sampler == "ris" { 0.49 } else { 1.0 },
+        errors: Errors {
+            mse: variance / f64::from(spp),
+            relmse: 1.0,
+            relmse_trimmed: if sampler == "ris" { 0.49 } else { 1.0 },
+            ..Errors::default()
+        },
         mean_ratio: 1.0 + 0.01 * f64::from(seed),
         mean_deviation: Some(-f64::from(seed)),
         parts: Parts {
@@ -79,7 +82,9 @@ fn ratios_are_of_pairs_of_one_seed() {
     ];
     assert_eq!(order, expected);
     let ris = &all[3];
-    assert!((ris.mse - 0.75).abs() < 1e-12 && (ris.rmse - 0.75_f64.sqrt()).abs() < 1e-12);
+    assert!(
+        (ris.errors.mse - 0.75).abs() < 1e-12 && (ris.errors.rmse - 0.75_f64.sqrt()).abs() < 1e-12
+    );
     let (ratio, efficiency) = (ris.rmse_ratio.unwrap(), ris.efficiency.unwrap());
     for value in [ratio.low, ratio.middle, ratio.high] {
         assert!((value - 0.5).abs() < 1e-9, "{ratio:?}");
