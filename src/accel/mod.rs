@@ -135,7 +135,10 @@ impl Accel {
         }
         let Trees { mut nodes, scene_triangles, first_triangles, depth } = trees;
         if depth > BVH_STACK_ENTRIES as usize {
-            return Err(too_deep(depth));
+            return Err(geometry_error(format!(
+                "the BVH is {depth} levels deep, traversal can stack {BVH_STACK_ENTRIES}: the scene has \
+                 many coincident triangles or instances; remove duplicates"
+            )));
         }
         if nodes.is_empty() {
             nodes.push([0; 20]);
@@ -399,13 +402,6 @@ fn stack_entries(nodes: &[CwBvhNode]) -> usize {
         pending.extend((0..children).map(|child| (node.child_base_idx + child, level + 1)));
     }
     deepest + usize::from(!nodes.is_empty())
-}
-
-fn too_deep(depth: usize) -> Error {
-    geometry_error(format!(
-        "the BVH is {depth} levels deep, traversal can stack {BVH_STACK_ENTRIES}: the scene has many \
-         coincident triangles or instances; remove duplicates"
-    ))
 }
 
 /// Positions and packed normals of a triangle; flat if one of its vertices has no normal.

@@ -1,6 +1,9 @@
 //! `fenestra compare`: error metrics of an image against a reference.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use crate::{
     error::{Error, Result},
@@ -145,13 +148,14 @@ fn print(arguments: &Arguments, picture: &crate::film::RgbImage, metrics: &Metri
 }
 
 fn check_thresholds(arguments: &Arguments, metrics: &Metrics) -> Result<()> {
+    let named = BTreeMap::from(metrics.named());
     let mut failures = Vec::new();
     // NaN fails every threshold.
     let is_within: [fn(&f64, &f64) -> bool; 2] = [f64::le, f64::ge];
     let limits = [("above", &arguments.fail_above), ("below", &arguments.fail_below)];
     for ((side, thresholds), is_within) in limits.into_iter().zip(is_within) {
         for (name, threshold) in thresholds {
-            let value = metrics.get(name).unwrap_or(f64::NAN);
+            let value = named.get(name.as_str()).copied().unwrap_or(f64::NAN);
             if !is_within(&value, threshold) {
                 failures.push(format!("{name} is {value:.6e}, {side} the threshold {threshold}"));
             }

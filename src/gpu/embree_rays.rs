@@ -94,11 +94,6 @@ impl Packet {
         self.count = 0;
     }
 
-    /// Tests whether no ray has room.
-    pub(crate) fn is_full(&self) -> bool {
-        self.count == LANES
-    }
-
     /// Places of the rays, lane by lane.
     pub(crate) fn places(&self) -> &[u32] {
         &self.places[..self.count]

@@ -307,7 +307,7 @@ fn in_packets(segments: impl Iterator<Item = (u32, Segment)>, mut follow: impl F
     let mut packet = Packet::new();
     for (place, (origin, direction, farthest)) in segments {
         packet.push(place, origin, direction, farthest);
-        if packet.is_full() {
+        if packet.places().len() == LANES {
             follow(&mut packet);
             packet.clear();
         }

@@ -17,7 +17,7 @@ use super::{
     order::{FEATURES, PassSettings, PathLists, wave_order},
     recording::{Recording, add_times},
     scene_buffers::SceneBuffers,
-    sharing_buffers::SharingBuffers,
+    sharing_buffers::{sharing_demand, sharing_set},
     steps::{Passes, PathDemand, SHADOW_RAYS_PER_GROUP, Steps},
     totals::Totals,
     wave_buffers::WaveBuffers,
@@ -48,7 +48,7 @@ pub struct Runner {
     device: Arc<Device>,
     scene: Arc<SceneBuffers>,
     waves: WaveBuffers,
-    sharing: Option<SharingBuffers>,
+    sharing: Option<DescriptorSet>,
     film: FilmBuffers,
     settings: PassSettings,
     passes: BTreeMap<Kernel, Pass>,
@@ -76,7 +76,7 @@ impl Runner {
         let padded_pixels = padded_pixels(window);
         let cohort_pixels = settings.cohort_edge * settings.cohort_edge;
         let rays = settings.shadow_rays.max(cohort_pixels).clamp(1, SHADOW_RAYS_PER_GROUP);
-        let demand = SharingBuffers::demand(demand, cohort_pixels);
+        let demand = sharing_demand(demand, cohort_pixels);
         let has_features = settings.aovs & FEATURES != 0;
         let waves = WaveBuffers::new(
             device,
@@ -95,7 +95,7 @@ impl Runner {
             (waves.capacity() / padded_pixels).max(1),
         )?;
         let sharing = (cohort_pixels > 1)
-            .then(|| SharingBuffers::new(device, waves.capacity(), cohort_pixels))
+            .then(|| sharing_set(device, waves.capacity(), cohort_pixels))
             .transpose()?;
         Ok(Self {
             device: Arc::clone(device),
@@ -403,8 +403,7 @@ impl Runner {
     /// Device memory by buffer, bytes.
     pub(crate) fn buffer_bytes(&self) -> BTreeMap<String, u64> {
         let mut bytes = self.film.buffer_bytes();
-        let sharing = self.sharing.iter().map(SharingBuffers::set);
-        let sets = [self.scene.set(), self.waves.set()].into_iter().chain(sharing);
+        let sets = [self.scene.set(), self.waves.set()].into_iter().chain(&self.sharing);
         bytes.extend(sets.flat_map(DescriptorSet::buffer_bytes));
         bytes
     }
@@ -429,10 +428,9 @@ fn sets<'a>(
     scene: &'a SceneBuffers,
     technique: &'a dyn Passes,
     waves: &'a WaveBuffers,
-    sharing: &'a Option<SharingBuffers>,
+    sharing: &'a Option<DescriptorSet>,
     film: &'a DescriptorSet,
 ) -> Vec<&'a DescriptorSet> {
     let common = [scene.set(), waves.set(), film];
-    let sharing = sharing.as_ref().map(SharingBuffers::set);
     common.into_iter().chain(technique.set()).chain(sharing).collect()
 }

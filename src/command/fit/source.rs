@@ -31,11 +31,6 @@ pub(crate) struct Source {
     pub inputs: Vec<PathBuf>,
 }
 
-/// Tests for the extension of a measured BRDF.
-fn is_measured(path: &Path) -> bool {
-    MEASURED.contains(&extension(path).as_str())
-}
-
 fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "fit".to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
@@ -86,7 +81,7 @@ pub(super) fn material(text: &str) -> Result<Source> {
         let tables = MaterialTables::new(std::slice::from_ref(found))?;
         return Ok(Source { name: format!("{}_{name}", scene.name), tables, inputs: scene.inputs });
     }
-    if is_measured(path) {
+    if MEASURED.contains(&extension(path).as_str()) {
         let table = MeasuredTable::load(path)?;
         warn(&table.warnings);
         let kind = MaterialKind::Measured { path: path.to_path_buf(), table: table.into() };

@@ -175,7 +175,7 @@ pub struct Arguments {
 }
 
 /// Interval of the preview of a picture to show.
-const PNG_INTERVAL: Duration = Duration::from_secs(5);
+pub(super) const PNG_INTERVAL: Duration = Duration::from_secs(5);
 /// Maximum film width of `--quick`, pixels.
 const QUICK_WIDTH: u32 = 240;
 
@@ -250,11 +250,6 @@ impl Arguments {
     /// True if a preview is written beside the image.
     pub(super) fn writes_png(&self) -> bool {
         self.png || self.png_every.is_some() || self.shows()
-    }
-
-    /// Interval at which the preview grows on disk.
-    pub(super) fn png_interval(&self) -> Option<Duration> {
-        self.png_every.or_else(|| self.shows().then_some(PNG_INTERVAL))
     }
 
     /// Applies `--size` or `--quick` to the film.

@@ -13,6 +13,7 @@ use std::{
 };
 
 pub use arguments::Arguments;
+use arguments::PNG_INTERVAL;
 use frames::is_finished;
 use preview::Preview;
 
@@ -259,7 +260,8 @@ impl RenderJob<'_> {
         if let Some(quality) = quality {
             progress.print(&announce(quality));
         }
-        let preview = self.arguments.png_interval().map(|interval| {
+        let interval = self.arguments.shows().then_some(PNG_INTERVAL);
+        let preview = self.arguments.png_every.or(interval).map(|interval| {
             let path = self.output.with_extension("png");
             Preview::new(path, self.arguments.exposure, interval)
         });

@@ -90,15 +90,7 @@ impl Checkpoint {
     /// # Errors
     /// [`Error::Io`] with the cause.
     pub fn write(&self, path: &Path) -> Result<()> {
-        self.write_with_guide(path, None)
-    }
-
-    /// Writes the checkpoint and the file of its guide, as [`Encoded::write`].
-    ///
-    /// # Errors
-    /// [`Error::Io`] with the cause.
-    pub fn write_with_guide(&self, path: &Path, guide: Option<&[u8]>) -> Result<()> {
-        self.encode(guide.map(<[u8]>::to_vec)).write(path)
+        self.encode(None).write(path)
     }
 
     /// Reads a checkpoint and the path and bytes of its guide, if it has one.
@@ -203,6 +195,10 @@ mod tests {
         }
     }
 
+    fn with_guide(samples: u32, guide: &[u8]) -> Encoded {
+        checkpoint(samples).encode(Some(guide.to_vec()))
+    }
+
     /// Stops the second writing before each of its steps, as a killed process or a full disk does,
     /// and within the first two, which leaves a part of a temporary file behind.
     #[test]
@@ -240,7 +236,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("room.checkpoint.exr");
         std::thread::scope(|scope| {
-            let second = || checkpoint(8).write_with_guide(&path, Some(b"second")).unwrap();
+            let second = || with_guide(8, b"second").write(&path).unwrap();
             let mut before = |step| {
                 if step == Step::Checkpoint {
                     let writer = scope.spawn(second);
@@ -251,10 +247,7 @@ mod tests {
                 }
                 Ok(())
             };
-            checkpoint(4)
-                .encode(Some(b"first".to_vec()))
-                .write_in_steps(&path, &mut before)
-                .unwrap();
+            with_guide(4, b"first").write_in_steps(&path, &mut before).unwrap();
             assert!(Checkpoint::read_with_guide(&path).unwrap().1.is_some());
         });
         assert_eq!(Checkpoint::read_with_guide(&path).unwrap().1.unwrap().1, b"second");
@@ -264,11 +257,11 @@ mod tests {
     fn obstacles_leave_the_older_pair() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("room.checkpoint.exr");
-        checkpoint(4).write_with_guide(&path, Some(b"older")).unwrap();
+        with_guide(4, b"older").write(&path).unwrap();
         // A folder where the guide should go
         let obstacle = guide_path(&path, &hexadecimal(&Sha256::digest(b"newer")));
         fs::create_dir(&obstacle).unwrap();
-        assert!(checkpoint(8).write_with_guide(&path, Some(b"newer")).is_err());
+        assert!(with_guide(8, b"newer").write(&path).is_err());
         let (read, guide) = Checkpoint::read_with_guide(&path).unwrap();
         assert_eq!((read, guide.unwrap().1), (checkpoint(4), b"older".to_vec()));
         // A folder where the checkpoint should go
@@ -276,7 +269,7 @@ mod tests {
         let kept = folder.path().join("kept");
         fs::rename(&path, &kept).unwrap();
         fs::create_dir(&path).unwrap();
-        assert!(checkpoint(8).write_with_guide(&path, Some(b"newer")).is_err());
+        assert!(with_guide(8, b"newer").write(&path).is_err());
         assert_eq!(guide_paths(&path).unwrap().len(), 1, "the try leaves nothing");
         fs::remove_dir(&path).unwrap();
         fs::rename(&kept, &path).unwrap();
@@ -288,7 +281,7 @@ mod tests {
     fn a_damaged_or_exchanged_guide_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("room.checkpoint.exr");
-        checkpoint(4).write_with_guide(&path, Some(b"learned")).unwrap();
+        with_guide(4, b"learned").write(&path).unwrap();
         let guide = guide_paths(&path).unwrap().remove(0);
         fs::write(&guide, b"lEarned").unwrap();
         let error = Checkpoint::read_with_guide(&path).unwrap_err().to_string();
@@ -297,7 +290,7 @@ mod tests {
         let error = Checkpoint::read_with_guide(&path).unwrap_err().to_string();
         assert!(error.contains(".guide: cannot read"), "{error}");
         // A checkpoint of a sampler that does not learn removes guides of older ones.
-        checkpoint(4).write_with_guide(&path, Some(b"learned")).unwrap();
+        with_guide(4, b"learned").write(&path).unwrap();
         checkpoint(8).write(&path).unwrap();
         assert_eq!(guide_paths(&path).unwrap(), Vec::<PathBuf>::new());
         assert!(Checkpoint::read_with_guide(&path).unwrap().1.is_none());

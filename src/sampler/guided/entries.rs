@@ -89,7 +89,7 @@ impl<'a> EntryWriter<'a> {
         let Self { tables, weights, levels, parts, starts } = self;
         weights.clear();
         levels.clear();
-        weights.extend(estimates.regions().iter().zip(&tables.shares).map(|(estimate, share)| {
+        weights.extend(estimates.regions.iter().zip(&tables.shares).map(|(estimate, share)| {
             let (power, level) = tables.powers[power_index(estimate.visibility)];
             levels.push(level);
             share * f64::from(estimate.response * power)

@@ -82,7 +82,7 @@ impl RegionTables {
 /// Estimates for every region in one cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Estimates {
-    regions: Vec<Estimate>,
+    pub(super) regions: Vec<Estimate>,
     mean_response: f32,
 }
 
@@ -95,11 +95,6 @@ impl Estimates {
     /// True for the default, which holds no region.
     pub fn is_empty(&self) -> bool {
         self.regions.is_empty()
-    }
-
-    /// Estimates region by region.
-    pub fn regions(&self) -> &[Estimate] {
-        &self.regions
     }
 
     /// Estimates for all cells of a face, with the whole `scene` as prior.

@@ -68,18 +68,14 @@ impl Tree {
             for node in first_of_level(level)..below {
                 let first_child = below + 4 * (node - first_of_level(level));
                 for child in 0..4 {
-                    nodes[node][child] = 0.25 * sum_of_four(nodes[first_child + child]);
+                    // The order of the shader.
+                    let [a, b, c, d] = nodes[first_child + child];
+                    nodes[node][child] = 0.25 * (a + b + c + d);
                 }
             }
         }
         Self { depth, nodes }
     }
-}
-
-/// Sum of four numbers in the order of the shader.
-fn sum_of_four(values: [f32; 4]) -> f32 {
-    let [a, b, c, d] = values;
-    a + b + c + d
 }
 
 /// Mean luminance of a texel.

@@ -68,11 +68,14 @@ impl Worker {
                 self.chooses_right = self.right.is_some() && !self.chooses_right;
                 self.tell();
             }
-            Action::Layer(layer) => self.toggle_layer(layer)?,
-            Action::NextLayer => {
+            Action::Layer(_) | Action::NextLayer => {
                 let now = self.parts.panel.borrow().layer;
                 let at = LAYERS.iter().position(|(layer, ..)| *layer == now).unwrap_or(0);
-                self.parts.panel.borrow_mut().layer = LAYERS[(at + 1) % LAYERS.len()].0;
+                self.parts.panel.borrow_mut().layer = match action {
+                    Action::Layer(layer) if layer != now => layer,
+                    Action::Layer(_) => SHOW_PICTURE,
+                    _ => LAYERS[(at + 1) % LAYERS.len()].0,
+                };
                 self.show_again()?;
             }
             Action::Inset => {
@@ -179,13 +182,6 @@ impl Worker {
     fn show_again(&mut self) -> Result<()> {
         self.looked_at = None;
         if self.is_stopped() { Ok(()) } else { self.show() }
-    }
-
-    fn toggle_layer(&mut self, layer: u32) -> Result<()> {
-        let mut panel = self.parts.panel.borrow_mut();
-        panel.layer = if panel.layer == layer { SHOW_PICTURE } else { layer };
-        drop(panel);
-        self.show_again()
     }
 
     fn choose_sampler(&mut self, sampler: Sampler) -> Result<()> {
