@@ -72,7 +72,7 @@ impl Runner {
         settings: PassSettings,
         demand: PathDemand,
     ) -> Result<Self> {
-        let window = scene.window();
+        let window = scene.window;
         let padded_pixels = padded_pixels(window);
         let cohort_pixels = settings.cohort_edge * settings.cohort_edge;
         let rays = settings.shadow_rays.max(cohort_pixels).clamp(1, SHADOW_RAYS_PER_GROUP);
@@ -90,7 +90,7 @@ impl Runner {
             device,
             window,
             settings.aovs,
-            &scene.light_groups().names()[..settings.light_groups as usize],
+            &scene.light_groups.names()[..settings.light_groups as usize],
             settings.film_page_bytes,
             (waves.capacity() / padded_pixels).max(1),
         )?;
@@ -272,8 +272,8 @@ impl Runner {
         let wave = Wave { film_start, ..wave };
         let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
         let order = wave_order(&settings, technique.steps(), wave, vertices);
-        let tracer = self.scene.geometry().host_tracer();
-        let host = tracer.map(|tracer| (tracer, &self.waves.answers, self.scene.parameters()));
+        let tracer = self.scene.geometry.host_tracer();
+        let host = tracer.map(|tracer| (tracer, &self.waves.answers, &self.scene.parameter_buffer));
         let pages = if accumulates { self.accumulated().count() } else { 0 };
         let accumulation = self.accumulation();
         made(&mut self.passes, &self.device, accumulation)?;
@@ -364,7 +364,7 @@ impl Runner {
 
     /// Names what traces this scene, as [`Device::tracer`] does: the device where the host has no tree.
     pub(crate) fn tracer(&self) -> String {
-        match self.scene.geometry().host_tracer() {
+        match self.scene.geometry.host_tracer() {
             Some(_) => self.device.tracer(),
             None => "device".to_owned(),
         }

@@ -34,13 +34,18 @@ use crate::{
 /// A scene on a device: geometry, materials, environment and camera.
 pub struct SceneBuffers {
     set: DescriptorSet,
-    geometry: GeometryBuffers,
-    parameter_buffer: Buffer,
+    /// Tree and triangles.
+    pub(crate) geometry: GeometryBuffers,
+    /// [`SceneParameters`].
+    pub(crate) parameter_buffer: Buffer,
     parameters: SceneParameters,
     surfaces: Surfaces,
-    window: Window,
-    light_groups: LightGroups,
-    host_ms: BTreeMap<String, f64>,
+    /// Part of the film that the parameters describe.
+    pub(crate) window: Window,
+    /// Groups of the scene's lights.
+    pub(crate) light_groups: LightGroups,
+    /// Host milliseconds by stage: `bvh`, `upload`.
+    pub(crate) host_ms: BTreeMap<String, f64>,
 }
 
 impl SceneBuffers {
@@ -186,22 +191,12 @@ impl SceneBuffers {
             crop_height: height,
             ..with_camera(self.parameters, camera)
         };
-        self.parameters().upload(bytemuck::bytes_of(&parameters))
+        self.parameter_buffer.upload(bytemuck::bytes_of(&parameters))
     }
 
     /// Descriptor set 0.
     pub fn set(&self) -> &DescriptorSet {
         &self.set
-    }
-
-    /// Tree and triangles.
-    pub(crate) fn geometry(&self) -> &GeometryBuffers {
-        &self.geometry
-    }
-
-    /// [`SceneParameters`].
-    pub(crate) fn parameters(&self) -> &Buffer {
-        &self.parameter_buffer
     }
 
     /// Filter of the film.
@@ -215,21 +210,6 @@ impl SceneBuffers {
     /// Specialization of passes by the surfaces of the scene.
     pub fn surfaces(&self) -> Surfaces {
         self.surfaces
-    }
-
-    /// Part of the film that the parameters describe.
-    pub(crate) fn window(&self) -> Window {
-        self.window
-    }
-
-    /// Groups of the scene's lights.
-    pub(crate) fn light_groups(&self) -> &LightGroups {
-        &self.light_groups
-    }
-
-    /// Host milliseconds by stage: `bvh`, `upload`.
-    pub(crate) fn host_ms(&self) -> &BTreeMap<String, f64> {
-        &self.host_ms
     }
 }
 

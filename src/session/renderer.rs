@@ -77,7 +77,7 @@ impl Renderer {
         settings.check(film_size)?;
         let window = window_of(&settings, scene);
         assert!(
-            [window, traced_window(&settings, scene)].contains(&buffers.window()),
+            [window, traced_window(&settings, scene)].contains(&buffers.window),
             "buffers belong to one window"
         );
 
@@ -89,17 +89,17 @@ impl Renderer {
             shadow_rays: settings.shadow_rays,
             depth: settings.depth,
             aovs: aov_bits(&settings.aovs),
-            light_groups: light_group_count(&settings, buffers.light_groups())?,
+            light_groups: light_group_count(&settings, &buffers.light_groups)?,
             roulette: settings.roulette,
             path_lists: settings.path_lists,
             cohort_edge,
             surfaces,
-            traversal: buffers.geometry().traversal(),
+            traversal: buffers.geometry.traversal(),
             incoherent: Schedule::incoherent(device.capabilities()),
             film_page_bytes: settings.film_page_bytes,
             most_paths: most_paths(device.capabilities()),
         };
-        check_memory(device, buffers.window(), passes.aovs, passes.light_groups)?;
+        check_memory(device, buffers.window, passes.aovs, passes.light_groups)?;
         let demand = settings.sampler.room().demand(&settings.parameters, settings.shadow_rays);
         let attempt = |most_paths| -> Result<_> {
             let passes = PassSettings { most_paths, ..passes };
@@ -273,7 +273,7 @@ impl Renderer {
 
     /// Host milliseconds by stage, including those of the technique.
     pub fn host_ms(&self) -> BTreeMap<String, f64> {
-        let mut host_ms = self.runner.scene().host_ms().clone();
+        let mut host_ms = self.runner.scene().host_ms.clone();
         host_ms.extend(self.report().host_ms);
         host_ms
     }

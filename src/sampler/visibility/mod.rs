@@ -68,7 +68,7 @@ impl Room for VisibilityRoom {
             settings.traversal,
             settings.shadow_rays,
         );
-        let window = runner.scene().window();
+        let window = runner.scene().window;
         let cached_pixels = (parameters.visibility.cache == CacheScope::Pixel)
             .then(|| u64::from(window.width) * u64::from(window.height));
         let size = LobeSize { cached_pixels, ..size(parameters, settings.shadow_rays) };
