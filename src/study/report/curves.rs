@@ -102,7 +102,7 @@ fn plot_figure(
     let title = format!("{scene}: {} against {}", ordinate.name, abscissa.name);
     format!(
         "<figure>{}{legend}</ul></figure>",
-        plot::log_log(&title, abscissa.title, ordinate.name, &all, ordinate.slope)
+        plot::log_log([&title, abscissa.title, ordinate.name], &all, ordinate.slope)
     )
 }
 

@@ -41,9 +41,11 @@ pub(crate) fn overhead_section(report: &Report) -> String {
          </section>",
         escape(baseline),
         plot::scatter(
-            &format!("Overhead over {baseline} against blocked shadow rays"),
-            &format!("blocked shadow rays of {baseline}, %"),
-            "more device time, %",
+            [
+                &format!("Overhead over {baseline} against blocked shadow rays"),
+                &format!("blocked shadow rays of {baseline}, %"),
+                "more device time, %",
+            ],
             &series,
             &ranges
         ),

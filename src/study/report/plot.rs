@@ -118,12 +118,11 @@ impl Frame {
     }
 
     /// Opening tag, grid, ticks and axis titles.
-    fn start(&self, title: &str, x_title: &str, y_title: &str) -> String {
+    fn start(&self, titles: [&str; 3]) -> String {
+        let [title, x_title, y_title] = titles.map(escape);
         let mut svg = format!(
             "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" \
-             aria-label=\"{}\"><title>{}</title>",
-            escape(title),
-            escape(title)
+             aria-label=\"{title}\"><title>{title}</title>"
         );
         let bottom = HEIGHT - BOTTOM;
         for tick in &self.x.ticks {
@@ -150,13 +149,11 @@ impl Frame {
         }
         let _ = write!(
             svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\
-             <text transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{x_title}</text>\
+             <text transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\">{y_title}</text>",
             0.5 * (LEFT + WIDTH - RIGHT),
             HEIGHT - 8.0,
-            escape(x_title),
-            0.5 * (TOP + bottom),
-            escape(y_title)
+            0.5 * (TOP + bottom)
         );
         svg
     }
@@ -189,14 +186,9 @@ fn mark(frame: &Frame, series: &Series, point: &Point) -> String {
     )
 }
 
-/// Draws lines with bands on two logarithmic axes, and a faint line of the given slope, at most 0.
-pub(crate) fn log_log(
-    title: &str,
-    x_title: &str,
-    y_title: &str,
-    series: &[Series],
-    slope: f64,
-) -> String {
+/// Draws lines with bands on two logarithmic axes, and a faint line of the given slope, at most 0. `titles` are
+/// those of the plot, of the abscissa and of the ordinate.
+pub(crate) fn log_log(titles: [&str; 3], series: &[Series], slope: f64) -> String {
     let all = || series.iter().flat_map(|series| &series.points);
     let frame = Frame {
         x: Axis::logarithmic(all().map(|point| point.x)),
@@ -206,7 +198,7 @@ pub(crate) fn log_log(
             [middle, low.max(middle / 3.0), high.min(middle * 3.0)]
         })),
     };
-    let mut svg = frame.start(title, x_title, y_title);
+    let mut svg = frame.start(titles);
     let [x0, x1] = [frame.x.low, frame.x.high];
     let middle = (frame.y.low * frame.y.high).sqrt() * (x0 * x1).powf(-0.5 * slope);
     // Clip the guide to the frame; a level one crosses all of it.
@@ -247,13 +239,7 @@ pub(crate) fn log_log(
 
 /// Draws points with error bars over 0…100% on linear axes; ordinates in percent. Ranges of ordinates are
 /// bands over the whole width, each with its text.
-pub(crate) fn scatter(
-    title: &str,
-    x_title: &str,
-    y_title: &str,
-    series: &[Series],
-    ranges: &[(&str, [f64; 2])],
-) -> String {
+pub(crate) fn scatter(titles: [&str; 3], series: &[Series], ranges: &[(&str, [f64; 2])]) -> String {
     let ordinates = series
         .iter()
         .flat_map(|series| &series.points)
@@ -266,7 +252,7 @@ pub(crate) fn scatter(
         x: Axis::linear(0.0, 100.0),
         y: Axis::linear(if low < 0.0 { low - room } else { 0.0 }, high + room),
     };
-    let mut svg = frame.start(title, x_title, y_title);
+    let mut svg = frame.start(titles);
     for (label, range) in ranges {
         let [bottom, top] = range.map(|ordinate| frame.y(ordinate));
         let _ = write!(
@@ -362,7 +348,7 @@ mod tests {
         let points: Vec<Point> =
             (0..8).map(|i| point(f64::from(1 << i), 1.0 / f64::from(1 << i).sqrt())).collect();
         let series = [Series { style: 0, name: "mis".into(), points }];
-        let svg = log_log("t", "samples", "RMSE", &series, -0.5);
+        let svg = log_log(["t", "samples", "RMSE"], &series, -0.5);
         for name in ["x1", "x2", "x"] {
             assert!(attribute(&svg, name).iter().all(|x| (0.0..=WIDTH).contains(x)), "{name}");
         }
@@ -376,9 +362,9 @@ mod tests {
     #[test]
     fn a_plot_of_nothing_is_empty_but_whole() {
         for svg in [
-            log_log("t", "x", "y", &[], -1.0),
-            log_log("t", "x", "y", &[], 0.0),
-            scatter("t", "x", "y", &[], &[]),
+            log_log(["t", "x", "y"], &[], -1.0),
+            log_log(["t", "x", "y"], &[], 0.0),
+            scatter(["t", "x", "y"], &[], &[]),
         ] {
             assert!(svg.ends_with("</svg>") && !svg.contains("NaN") && !svg.contains("inf"));
         }
@@ -398,7 +384,7 @@ mod tests {
     #[test]
     fn overheads_have_bars_and_published_ranges() {
         let series = [Series { style: 1, name: "v".into(), points: vec![point(80.0, 40.0)] }];
-        let svg = scatter("t", "x", "y", &series, &[("thesis <closed>", [40.0, 50.0])]);
+        let svg = scatter(["t", "x", "y"], &series, &[("thesis <closed>", [40.0, 50.0])]);
         assert!(svg.contains("class=\"range\"") && svg.contains("class=\"bar\""));
         assert!(svg.contains("thesis &lt;closed&gt;"));
         // Ten of the 53 percent that the drawing shows, and a pixel about them.
@@ -412,7 +398,7 @@ mod tests {
         let points =
             vec![point(97.0, 40.0), point(97.5, 40.5), point(98.0, 41.0), point(20.0, 1.0)];
         let series = [Series { style: 1, name: "v".into(), points }];
-        let svg = scatter("t", "x", "y", &series, &[]);
+        let svg = scatter(["t", "x", "y"], &series, &[]);
         let mut heights: Vec<f64> = svg
             .split("<text ")
             .filter(|text| text.contains(">room<"))
