@@ -14,6 +14,8 @@
 //!
 //! Octave of the light of every visible ray, its c p_B / q → [`ShareEvidence`] → share in 256ths.
 
+use std::ops::AddAssign;
+
 use crate::shader::rooms::guided::GUIDE_SHARE_OCTAVES;
 
 /// Words of the counts of one cell: for every octave of X from 2⁻³² on, the number of visible rays
@@ -51,12 +53,6 @@ impl ShareEvidence {
         Self { rays, weighted: rays * (from_brdf / sum).min(1.0) }
     }
 
-    /// Adds the evidence of another cell.
-    pub fn add(&mut self, other: Self) {
-        self.rays += other.rays;
-        self.weighted += other.weighted;
-    }
-
     /// Share of the BRDF, given that of the surroundings; `None` where there is neither prior nor
     /// evidence worth as much.
     pub fn share(self, prior: Option<f64>) -> Option<f64> {
@@ -64,6 +60,13 @@ impl ShareEvidence {
             Some(prior) => Some((self.weighted + PRIOR_RAYS * prior) / (self.rays + PRIOR_RAYS)),
             None => (self.rays >= PRIOR_RAYS).then(|| self.weighted / self.rays),
         }
+    }
+}
+
+impl AddAssign for ShareEvidence {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.weighted += other.weighted;
     }
 }
 

@@ -100,32 +100,20 @@ impl Guide {
     /// Share of the BRDF of every cell, 256ths, 0 where the material decides. The prior of a cell
     /// is its parent, that of a face the scene.
     fn brdf_shares(&self, tree: &Tree) -> Vec<u32> {
-        let mut sums: Vec<ShareEvidence> =
+        let own: Vec<ShareEvidence> =
             self.shares.par_chunks(SHARE_WORDS).map(ShareEvidence::from_counts).collect();
         let mut scene = ShareEvidence::default();
-        for evidence in &sums {
-            scene.add(*evidence);
-        }
-        for generation in tree.generations.iter().rev() {
-            for &cell in generation {
-                for &child in &tree.children[cell] {
-                    let evidence = sums[child];
-                    sums[cell].add(evidence);
-                }
-            }
+        for evidence in &own {
+            scene += *evidence;
         }
         let scene = scene.share(None);
-        let mut shares: Vec<Option<f64>> =
-            sums[..FACE_COUNT].iter().map(|sum| sum.share(scene)).collect();
-        shares.resize(self.cell_count(), None);
-        for generation in &tree.generations {
-            for &cell in generation {
-                for &child in &tree.children[cell] {
-                    shares[child] = sums[child].share(shares[cell]);
-                }
-            }
-        }
-        shares.into_iter().map(share_in_256ths).collect()
+        let sums = tree.sums(|cell| std::iter::once(own[cell]));
+        let share = |cell: usize, shares: &[Option<f64>]| {
+            let prior = if cell < FACE_COUNT { scene } else { shares[tree.parents[cell]] };
+            sums[cell].first().unwrap_or(&own[cell]).share(prior)
+        };
+        let inner = tree.down(share);
+        (0..own.len()).map(|cell| share_in_256ths(share(cell, &inner))).collect()
     }
 
     /// Importance of every region to the scene under `snapshot`: the root of the mean over all fine
