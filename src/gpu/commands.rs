@@ -126,12 +126,12 @@ impl Commands {
         // SAFETY: the command buffer is recording; pipeline, layout and sets belong to the device
         // and the caller keeps them alive until the submission has been waited for.
         unsafe {
-            raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
+            raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.made.raw);
             for set in sets.iter().filter(|set| pipeline.uses(set)) {
                 raw.cmd_bind_descriptor_sets(
                     self.raw,
                     vk::PipelineBindPoint::COMPUTE,
-                    pipeline.layout(),
+                    pipeline.made.layout,
                     set.index(),
                     &[set.raw],
                     &[],
@@ -140,7 +140,7 @@ impl Commands {
             if !push_constants.is_empty() {
                 raw.cmd_push_constants(
                     self.raw,
-                    pipeline.layout(),
+                    pipeline.made.layout,
                     vk::ShaderStageFlags::COMPUTE,
                     0,
                     push_constants,

@@ -275,7 +275,7 @@ pub(crate) fn embree_for(
 
 /// Names what traces, given the host's library if it does.
 pub(crate) fn tracer_name(embree: Option<&Arc<Embree>>) -> String {
-    embree.map_or_else(|| "device".to_owned(), |embree| format!("Embree {}", embree.version()))
+    embree.map_or_else(|| "device".to_owned(), |embree| format!("Embree {}", embree.version))
 }
 
 fn has_extension(instance: &Instance, physical: vk::PhysicalDevice, name: &CStr) -> Result<bool> {

@@ -84,7 +84,8 @@ pub(crate) struct Embree {
     device_error: unsafe extern "C" fn(Handle) -> c_int,
     release_device: unsafe extern "C" fn(Handle),
     pub(super) device: Handle,
-    version: String,
+    /// Version of the library: "3.13.5".
+    pub(crate) version: String,
     /// Never unloaded: threads of the library may outlive its device.
     _library: ManuallyDrop<Library>,
 }
@@ -150,11 +151,6 @@ impl Embree {
             version,
             _library: ManuallyDrop::new(library),
         }))
-    }
-
-    /// Version of the library: "3.13.5".
-    pub(crate) fn version(&self) -> &str {
-        &self.version
     }
 
     /// Turns the device's last error, if there is one, into ours.

@@ -11,7 +11,7 @@ use crate::{error::Result, shader::spirv::used_bindings, stage};
 
 /// A compute pipeline.
 pub struct Pipeline {
-    made: Made,
+    pub(super) made: Made,
     name: String,
     /// Keeps the pipeline's owner.
     _device: Arc<Device>,
@@ -41,14 +41,6 @@ impl Pipeline {
     /// Returns true if the shader uses buffers of this descriptor set.
     pub(crate) fn uses(&self, set: &DescriptorSet) -> bool {
         self.made.used[set.index() as usize].is_some_and(|number| set.has(number))
-    }
-
-    pub(super) fn raw(&self) -> vk::Pipeline {
-        self.made.raw
-    }
-
-    pub(super) fn layout(&self) -> vk::PipelineLayout {
-        self.made.layout
     }
 }
 

@@ -43,8 +43,8 @@ pub(crate) struct Swapchain {
     raw: vk::SwapchainKHR,
     images: Vec<vk::Image>,
     size: [u32; 2],
-    /// True if blue comes first in memory.
-    is_bgra: bool,
+    /// True if the bytes of a pixel are blue, green, red, else red, green, blue; the fourth is unused.
+    pub(crate) is_bgra: bool,
     acquired: vk::Fence,
     device: Arc<Device>,
     // Last: the window must outlive its surface.
@@ -193,11 +193,6 @@ impl Swapchain {
     /// Width and height of the images; zeros while nothing can be shown.
     pub(crate) fn size(&self) -> [u32; 2] {
         self.size
-    }
-
-    /// True if the bytes of a pixel are blue, green, red, else red, green, blue; the fourth is unused.
-    pub(crate) fn is_bgra(&self) -> bool {
-        self.is_bgra
     }
 
     /// Shows the pixels of a buffer, four bytes each, row by row from the top.

@@ -99,7 +99,7 @@ pub struct Dispatch {
 
 /// A kernel compiled for a device.
 pub struct Pass {
-    kernel: Kernel,
+    pub(super) kernel: Kernel,
     /// None where the host does all.
     pipeline: Option<Pipeline>,
 }
@@ -113,11 +113,6 @@ impl Pass {
             .then(|| Pipeline::new(device, kernel.shader, spirv, &kernel.constants))
             .transpose()?;
         Ok(Self { kernel, pipeline })
-    }
-
-    /// The kernel.
-    pub(super) fn kernel(&self) -> &Kernel {
-        &self.kernel
     }
 
     /// Records the dispatch over `wave`, binding those of `sets` that its shader uses, with as many

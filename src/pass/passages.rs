@@ -71,7 +71,7 @@ impl PassingSurfaces {
             uses: tables.textures.uses.clone(),
             textures: texture_pages.to_vec(),
             attributes: attribute_pages.to_vec(),
-            access: textures.access(),
+            access: textures.access,
             passes,
         })
     }

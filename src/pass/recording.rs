@@ -51,7 +51,7 @@ impl<'a> Recording<'a> {
     /// # Errors
     /// As [`Commands::submit_and_wait`].
     pub fn add(&mut self, pass: &Pass, sets: &[&DescriptorSet], wave: &Wave) -> Result<bool> {
-        if let (Some(question), Some(host)) = (pass.kernel().question, self.host) {
+        if let (Some(question), Some(host)) = (pass.kernel.question, self.host) {
             let (tracer, answers, parameters) = host;
             let next = Commands::begin_timed(self.device, self.most_passes)?;
             let mut before = std::mem::replace(&mut self.commands, next);
@@ -68,7 +68,7 @@ impl<'a> Recording<'a> {
                 self.most_listed = Some(walked);
             }
             let ms = start.elapsed().as_secs_f64() * 1e3;
-            *self.times.entry(pass.kernel().shader.to_owned()).or_default() += ms;
+            *self.times.entry(pass.kernel.shader.to_owned()).or_default() += ms;
         }
         pass.record(&mut self.commands, sets, wave, self.most_listed);
         Ok(true)

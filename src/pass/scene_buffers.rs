@@ -104,7 +104,7 @@ impl SceneBuffers {
                 | if geometry.traversal().is_instanced { SURFACES_INSTANCED } else { 0 }
                 | if lamp_cells.is_some() { SURFACES_LAMP_CELLS } else { 0 },
             lamp_count: lamps.source_count,
-            access: textures.access(),
+            access: textures.access,
         };
         let materials = Buffer::from_slice(device, "materials", &tables.materials)?;
         let brdf_table = Buffer::texels_from_slice(device, "BRDF tables", &tables.words)?;

@@ -39,7 +39,8 @@ pub(crate) struct TextureBuffers {
     attribute_pages: Vec<Buffer>,
     uses: Buffer,
     surfaces: Buffer,
-    access: TextureAccess,
+    /// Specialization of the passes that read textures.
+    pub(crate) access: TextureAccess,
 }
 
 impl TextureBuffers {
@@ -109,11 +110,6 @@ impl TextureBuffers {
     /// Texels, and attributes of triangles.
     pub(crate) fn pages(&self) -> [&[Buffer]; 2] {
         [&self.texture_pages, &self.attribute_pages]
-    }
-
-    /// Returns the specialization of the passes that read textures.
-    pub(crate) fn access(&self) -> TextureAccess {
-        self.access
     }
 }
 

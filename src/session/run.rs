@@ -89,8 +89,8 @@ pub struct Session {
     pub pace: Duration,
     /// Samples and seconds of the last pass.
     pub(super) last_pass: Option<(u32, f64)>,
-    /// True if a checkpoint of this render lies on the disk.
-    has_checkpoint: bool,
+    /// True if a checkpoint of this render lies on the disk: it was resumed from, or has been written.
+    pub(crate) has_checkpoint: bool,
     /// Start of the pass under way, for its watch.
     pass_start: Rc<Cell<Instant>>,
     /// Wall time that earlier runs spent in passes, seconds.
@@ -348,11 +348,6 @@ impl Session {
         let written = encoded.map(|encoded| encoded.write(path));
         self.has_checkpoint |= matches!(written, Ok(Ok(())));
         (done, written)
-    }
-
-    /// True if a checkpoint of this render lies on the disk: it was resumed from, or has been written.
-    pub(crate) fn has_checkpoint(&self) -> bool {
-        self.has_checkpoint
     }
 
     /// Removes the checkpoint again if it leaves too little of the disk for the image.

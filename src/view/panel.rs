@@ -151,7 +151,7 @@ impl Panel {
             if size.contains(&0) {
                 return Ok(());
             }
-            let pixels = self.compose(size, self.swapchain.is_bgra())?;
+            let pixels = self.compose(size, self.swapchain.is_bgra)?;
             match self.swapchain.present(&pixels)? {
                 Presented::Done => return Ok(()),
                 Presented::Outdated => self.swapchain.resize(self.size)?,

@@ -65,7 +65,7 @@ impl RenderJob<'_> {
             let picture = write_picture();
             let has_picture = picture.is_ok();
             note(&self.output, picture);
-            if has_picture && writes_checkpoints && session.has_checkpoint() {
+            if has_picture && writes_checkpoints && session.has_checkpoint {
                 remove_checkpoint(&checkpoint).unwrap_or_else(|error| log::warn!("{error}"));
             }
         }
