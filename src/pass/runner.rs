@@ -45,12 +45,12 @@ pub(crate) type Watch = Box<dyn FnMut(&Wave) -> bool>;
 
 /// A scene, a film and the paths in flight on a device. Knows no sampler.
 pub struct Runner {
-    device: Arc<Device>,
-    scene: Arc<SceneBuffers>,
-    waves: WaveBuffers,
+    pub(crate) device: Arc<Device>,
+    pub(crate) scene: Arc<SceneBuffers>,
+    pub(crate) waves: WaveBuffers,
     sharing: Option<DescriptorSet>,
     film: FilmBuffers,
-    settings: PassSettings,
+    pub(crate) settings: PassSettings,
     passes: BTreeMap<Kernel, Pass>,
     /// Shadow rays per hit that fit the buffers.
     most_shadow_rays: u32,
@@ -58,7 +58,8 @@ pub struct Runner {
     totals: Totals,
     /// Most that a counter of the device can hold since they were read.
     uncounted: u64,
-    compile_ms: PassTimes,
+    /// Milliseconds that the first use of each pass took, and the creation of all as `pipelines`.
+    pub(crate) compile_ms: PassTimes,
     watch: Option<Watch>,
     is_stopped: bool,
 }
@@ -357,11 +358,6 @@ impl Runner {
         Ok(())
     }
 
-    /// The device.
-    pub(crate) fn device(&self) -> &Arc<Device> {
-        &self.device
-    }
-
     /// Names what traces this scene, as [`Device::tracer`] does: the device where the host has no tree.
     pub(crate) fn tracer(&self) -> String {
         match self.scene.geometry.host_tracer() {
@@ -370,34 +366,14 @@ impl Runner {
         }
     }
 
-    /// The scene on the device.
-    pub(crate) fn scene(&self) -> &Arc<SceneBuffers> {
-        &self.scene
-    }
-
-    /// Buffers of the wave.
-    pub(crate) fn waves(&self) -> &WaveBuffers {
-        &self.waves
-    }
-
     /// The film on the device.
     pub(crate) fn film(&self) -> &FilmBuffers {
         &self.film
     }
 
-    /// Settings of the passes.
-    pub(crate) fn settings(&self) -> &PassSettings {
-        &self.settings
-    }
-
     /// Counts and device times so far.
     pub(crate) fn totals(&self) -> &Totals {
         &self.totals
-    }
-
-    /// Milliseconds that the first use of each pass took, and the creation of all as `pipelines`.
-    pub(crate) fn compile_ms(&self) -> &PassTimes {
-        &self.compile_ms
     }
 
     /// Device memory by buffer, bytes.

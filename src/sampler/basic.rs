@@ -75,7 +75,7 @@ impl Room for Basic {
     }
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
-        let surfaces = context.runner.settings().surfaces;
+        let surfaces = context.runner.settings.surfaces;
         let steps = self.steps(context.parameters, surfaces)?;
         Ok(Box::new(Unlearned { steps, set: None, host_ms: BTreeMap::new() }))
     }

@@ -53,6 +53,6 @@ impl Renderer {
 
     /// The scene on the device, for [`Renderer::with_scene_buffers`].
     pub fn scene_buffers(&self) -> Arc<SceneBuffers> {
-        Arc::clone(self.runner.scene())
+        Arc::clone(&self.runner.scene)
     }
 }

@@ -243,7 +243,7 @@ impl Renderer {
 
     /// Filter of the film.
     pub(crate) fn filter(&self) -> Filter {
-        self.runner.scene().filter()
+        self.runner.scene.filter()
     }
 
     /// Samples of every pixel in the film.
@@ -263,7 +263,7 @@ impl Renderer {
 
     /// Milliseconds that the first use of each pass took, and the creation of all as `pipelines`.
     pub fn compile_ms(&self) -> &PassTimes {
-        self.runner.compile_ms()
+        &self.runner.compile_ms
     }
 
     /// Figures of the technique.
@@ -273,7 +273,7 @@ impl Renderer {
 
     /// Host milliseconds by stage, including those of the technique.
     pub fn host_ms(&self) -> BTreeMap<String, f64> {
-        let mut host_ms = self.runner.scene().host_ms.clone();
+        let mut host_ms = self.runner.scene.host_ms.clone();
         host_ms.extend(self.report().host_ms);
         host_ms
     }

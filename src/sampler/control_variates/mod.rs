@@ -51,11 +51,11 @@ impl Room for ControlVariatesRoom {
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let Context { scene, parameters, runner } = context;
-        let surfaces = runner.settings().surfaces;
+        let surfaces = runner.settings.surfaces;
         let grid = RecordGrid::new(scene, &parameters.control_variates);
         let pilot = pilot_steps(parameters, grid, surfaces)?;
         let steps = steps(parameters, grid, surfaces)?;
-        let buffers = RecordBuffers::new(runner.device(), grid)?;
+        let buffers = RecordBuffers::new(&runner.device, grid)?;
         Ok(Box::new(Piloted::new(buffers, [pilot, steps], 1, BTreeMap::new())))
     }
 }

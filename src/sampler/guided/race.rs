@@ -134,7 +134,7 @@ impl Work {
 impl Race<'_> {
     /// True if a wave has room for a block.
     pub(super) fn fits(runner: &Runner) -> bool {
-        runner.waves().capacity() >= SAMPLES * BLOCK_PIXELS
+        runner.waves.capacity() >= SAMPLES * BLOCK_PIXELS
     }
 
     /// Races `contenders`, of which the first is in use. Returns the winner, the costs of all and the
@@ -159,13 +159,13 @@ impl Race<'_> {
             let mut round_work = Work::default();
             let mut block = spread.block_count();
             for wave in self.waves(runner, progress, blocks, round) {
-                let depth = runner.settings().depth;
+                let depth = runner.settings.depth;
                 let times = runner.run(&trials[index], wave, depth, false)?;
                 let paths = (wave.pixel_count * SAMPLES) as usize;
                 ms[index] +=
                     times.values().sum::<f64>() / f64::from(blocks.count * BLOCK_PIXELS * SAMPLES);
-                let paths: Vec<PathState> = runner.waves().answers.paths.download(paths)?;
-                let filter = runner.scene().filter();
+                let paths: Vec<PathState> = runner.waves.answers.paths.download(paths)?;
+                let filter = runner.scene.filter();
                 for first in (0..wave.pixel_count as usize).step_by(BLOCK_PIXELS as usize) {
                     let samples = (0..SAMPLES).zip(paths.chunks(wave.pixel_count as usize));
                     let films = samples.map(|(sample, paths)| {
@@ -209,7 +209,7 @@ impl Race<'_> {
     fn waves(&self, runner: &Runner, progress: &Progress, blocks: Blocks, round: u32) -> Vec<Wave> {
         let first_sample = progress.next_sample().wrapping_add(round * SAMPLES);
         let start = round * (blocks.starts / MOST_ROUNDS).max(1) % blocks.starts;
-        let together = runner.waves().capacity() / SAMPLES / BLOCK_PIXELS;
+        let together = runner.waves.capacity() / SAMPLES / BLOCK_PIXELS;
         let wave = |first: u32| Wave {
             first_pixel: (start + first * blocks.stride) * BLOCK_PIXELS,
             pixel_count: together.min(blocks.count - first) * BLOCK_PIXELS,

@@ -63,18 +63,18 @@ impl Room for GuidedRoom {
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let Context { scene, parameters, runner } = context;
-        let settings = runner.settings();
+        let settings = &runner.settings;
         let own = parameters.guided;
         let size = GuideSize {
             pixels: runner.film().padded_pixels(),
-            paths: runner.waves().capacity(),
+            paths: runner.waves.capacity(),
             shadow_rays: settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP),
             has_bounces: own.guides_bounces(settings.depth),
         };
-        let arms = Arms::new(parameters, settings, runner.device().capabilities())?;
+        let arms = Arms::new(parameters, settings, runner.device.capabilities())?;
         let arm = arms.first(false);
         Ok(Box::new(Guided {
-            buffers: GuideBuffers::new(runner.device(), scene, &own, size)?,
+            buffers: GuideBuffers::new(&runner.device, scene, &own, size)?,
             steps: arms.steps(&arm),
             arms,
             choice: Choice::of(arm),

@@ -46,14 +46,14 @@ impl Room for HaarRoom {
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let Context { scene, parameters, runner } = context;
-        let settings = runner.settings();
+        let settings = &runner.settings;
         let start = Instant::now();
         let tree = Tree::new(&scene.environment);
         let tree_ms = start.elapsed().as_secs_f64() * 1e3;
         let (surfaces, shadow_rays) = (settings.surfaces, settings.shadow_rays);
         let steps = HaarSteps::new(parameters, tree.depth, surfaces, shadow_rays);
         let size = NodeSize::new(parameters, shadow_rays);
-        let nodes = NodeBuffers::new(runner.device(), &tree, size, runner.waves().capacity())?;
+        let nodes = NodeBuffers::new(&runner.device, &tree, size, runner.waves.capacity())?;
         let host_ms = [("environment tree".to_owned(), tree_ms)].into();
         Ok(Box::new(Unlearned { steps, set: Some(nodes.set), host_ms }))
     }

@@ -42,8 +42,8 @@ impl Room for PortalRoom {
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let Context { scene, parameters, runner } = context;
         let count = scene.portals.len() as u32;
-        let steps = steps(parameters, count, runner.settings().surfaces);
-        let set = Some(upload(runner.device(), &scene.portals)?);
+        let steps = steps(parameters, count, runner.settings.surfaces);
+        let set = Some(upload(&runner.device, &scene.portals)?);
         Ok(Box::new(Unlearned { steps, set, host_ms: BTreeMap::new() }))
     }
 }

@@ -46,10 +46,10 @@ impl Room for ProductRoom {
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let Context { scene, parameters, runner } = context;
         let parameters = parameters.product;
-        let fits = Fits::new(runner.device(), scene, &parameters)?;
-        let steps = ProductSteps::new(parameters, fits.sizes, runner.settings().surfaces);
-        let paths = runner.waves().capacity();
-        let lobes = LobeBuffers::new(runner.device(), fits, size(&parameters), paths)?;
+        let fits = Fits::new(&runner.device, scene, &parameters)?;
+        let steps = ProductSteps::new(parameters, fits.sizes, runner.settings.surfaces);
+        let paths = runner.waves.capacity();
+        let lobes = LobeBuffers::new(&runner.device, fits, size(&parameters), paths)?;
         Ok(Box::new(Product { steps, lobes }))
     }
 }

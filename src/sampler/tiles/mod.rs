@@ -57,9 +57,9 @@ impl Room for TilesRoom {
         let partition = Partition::new(&scene.environment, own.environment_tiles as usize);
         let cache = TileCache::new(&partition, own.tile_floor, parameters.compensation);
         let grid = SectorGrid::new(scene, own, cache.tiles());
-        let surfaces = runner.settings().surfaces;
+        let surfaces = runner.settings.surfaces;
         let steps = [true, false].map(|learns| steps(cache.tiles(), learns, surfaces));
-        let buffers = TileBuffers::new(runner.device(), &partition, grid, cache)?;
+        let buffers = TileBuffers::new(&runner.device, &partition, grid, cache)?;
         let ms = start.elapsed().as_secs_f64() * 1e3;
         let prepare_ms = [("environment tiles".to_owned(), ms)].into();
         Ok(Box::new(Piloted::new(buffers, steps, own.pilot_samples, prepare_ms)))

@@ -58,8 +58,8 @@ impl Room for VisibilityRoom {
 
     fn create(&self, context: Context<'_>) -> Result<Box<dyn Technique>> {
         let Context { scene, parameters, runner } = context;
-        let settings = runner.settings();
-        let fits = Fits::new(runner.device(), scene, &parameters.product)?;
+        let settings = &runner.settings;
+        let fits = Fits::new(&runner.device, scene, &parameters.product)?;
         let steps = VisibilitySteps::new(
             parameters.visibility,
             parameters.product,
@@ -68,14 +68,14 @@ impl Room for VisibilityRoom {
             settings.traversal,
             settings.shadow_rays,
         );
-        let window = runner.scene().window;
+        let window = runner.scene.window;
         let cached_pixels = (parameters.visibility.cache == CacheScope::Pixel)
             .then(|| u64::from(window.width) * u64::from(window.height));
         let size = LobeSize { cached_pixels, ..size(parameters, settings.shadow_rays) };
-        let paths = runner.waves().capacity();
+        let paths = runner.waves.capacity();
         Ok(Box::new(Visibility {
             steps,
-            lobes: LobeBuffers::new(runner.device(), fits, size, paths)?,
+            lobes: LobeBuffers::new(&runner.device, fits, size, paths)?,
             parameters: parameters.visibility,
             kept_lobes: size.kept_lobes,
             cache_places: size.cache_capacity,
