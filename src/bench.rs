@@ -162,11 +162,11 @@ struct Bench<'a> {
 impl<'a> Bench<'a> {
     fn new(device: &'a Arc<Device>, scene: &'a SceneBuffers, plan: &RayPlan) -> Result<Self> {
         let (paths, rays, demand) = (plan.paths, plan.shadow_rays, PathDemand::default());
-        let waves = WaveBuffers::new(device, paths, paths, rays, demand, scene.surfaces())?;
+        let waves = WaveBuffers::new(device, paths, paths, rays, demand, scene.surfaces)?;
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64)?;
         let film_set = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &counters)])?;
         let wave = Wave {
-            pixel_count: paths.min(waves.capacity()),
+            pixel_count: paths.min(waves.capacity),
             sample_count: 1,
             shadow_ray_count: rays,
             total_shadow_rays: rays,
@@ -180,7 +180,7 @@ impl<'a> Bench<'a> {
         let tracer = self.scene.geometry.host_tracer();
         let host = tracer.map(|tracer| (tracer, &self.waves.answers, &self.scene.parameter_buffer));
         let mut recording = Recording::begin(self.device, 1, host, false)?;
-        let sets = [self.scene.set(), self.waves.set(), &self.film_set];
+        let sets = [&self.scene.set, &self.waves.set, &self.film_set];
         recording.add(pass, &sets, &self.wave)?;
         Ok(recording.finish()?.values().sum::<f64>() * 1e-3)
     }
@@ -241,7 +241,7 @@ pub fn measure(
 ) -> Result<Vec<RayRate>> {
     let mut bench = Bench::new(device, scene, plan)?;
     let yardstick = Yardstick::new(accel, plan.threads)?;
-    let (traversal, surfaces) = (scene.geometry.traversal(), scene.surfaces());
+    let (traversal, surfaces) = (scene.geometry.traversal(), scene.surfaces);
     let incoherent = Schedule::incoherent(device.capabilities());
     let compare = |bench: &_, kind, kernel, any_hit| {
         compare(kind, &yardstick, bench, &Pass::new(device, kernel)?, any_hit, plan.repetitions)

@@ -252,7 +252,7 @@ fn both(clay: &str, more: &str) -> (Folder, String, Vec<String>, [Scene; 2]) {
 fn value_at(used: &TextureUse, uv: Vec2) -> Vec3 {
     let mut tables = TextureTables::default();
     let index = tables.add(Some(used));
-    let words = tables.words(0..tables.word_count());
+    let words = tables.words(0..tables.word_count);
     texture_value(&words, &tables.uses, index, uv, uv).truncate()
 }
 

@@ -136,13 +136,13 @@ fn bounce(
     let waves =
         WaveBuffers::new(device, PIXELS, 1 << 17, 1, PathDemand::default(), Surfaces::default())
             .unwrap();
-    assert!(waves.capacity() >= paths);
+    assert!(waves.capacity >= paths);
     let input = PathInput::new(0, floor.normal, floor.outgoing);
     PathInput::put(&vec![input; paths as usize], &waves);
     let states = vec![PathState { throughput: [1.0; 3], ..PathState::default() }; paths as usize];
     waves.answers.paths.upload(bytemuck::cast_slice(&states)).unwrap();
 
-    let kinds = (CONSTANT_MATERIAL_KINDS, buffers.surfaces().material_kinds);
+    let kinds = (CONSTANT_MATERIAL_KINDS, buffers.surfaces.material_kinds);
     let create = |name: &str, constants: &[(u32, u32)]| {
         Pipeline::new(device, name, spirv::pass(name), constants).unwrap()
     };
@@ -158,7 +158,7 @@ fn bounce(
         seed,
         ..Wave::default()
     };
-    let sets = [buffers.set(), &guide.set, waves.set()];
+    let sets = [&buffers.set, &guide.set, &waves.set];
     let push = bytemuck::bytes_of(&wave);
     let mut commands = Commands::begin(device).unwrap();
     // Find the cell.

@@ -157,7 +157,7 @@ impl Paths {
         let constants = [
             (CONSTANT_CANDIDATES, candidates),
             (CONSTANT_BRDF_CANDIDATES, candidates / 4),
-            (CONSTANT_MATERIAL_KINDS, self.scene.surfaces().material_kinds),
+            (CONSTANT_MATERIAL_KINDS, self.scene.surfaces.material_kinds),
         ];
         let wave = Wave {
             pixel_count: 1,
@@ -167,7 +167,7 @@ impl Paths {
             epoch_seed: 0x5eed + candidates,
             ..Wave::default()
         };
-        let sets = [self.scene.set(), &self.guide.set, self.waves.set()];
+        let sets = [&self.scene.set, &self.guide.set, &self.waves.set];
         support::run_probe_with(
             "guided_candidates",
             &constants,

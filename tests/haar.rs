@@ -128,8 +128,8 @@ impl Paths {
         let size = NodeSize::new(&parameters, SHADOW_RAYS);
         let waves =
             WaveBuffers::new(device, 64, 1 << 17, 1, size.demand(), Surfaces::default()).unwrap();
-        let steps = HaarSteps::new(&parameters, tree.depth, buffers.surfaces(), SHADOW_RAYS);
-        let nodes = NodeBuffers::new(device, &tree, size, waves.capacity()).unwrap();
+        let steps = HaarSteps::new(&parameters, tree.depth, buffers.surfaces, SHADOW_RAYS);
+        let nodes = NodeBuffers::new(device, &tree, size, waves.capacity).unwrap();
         let wave = Wave {
             pixel_count: surfaces.len() as u32,
             sample_count: 1,
@@ -154,7 +154,7 @@ impl Paths {
         for kernel in kernels {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
-            let sets = [self.scene.set(), &self.nodes.set, self.waves.set()];
+            let sets = [&self.scene.set, &self.nodes.set, &self.waves.set];
             pass.record(&mut commands, &sets, &self.wave, None);
             commands.submit_and_wait().unwrap();
         }
@@ -185,7 +185,7 @@ impl Paths {
             (CONSTANT_HAAR_LEVEL, self.level()),
             (CONSTANT_HAAR_DEPTH, self.tree.depth),
         ];
-        let sets = [self.scene.set(), &self.nodes.set, self.waves.set()];
+        let sets = [&self.scene.set, &self.nodes.set, &self.waves.set];
         let push = bytemuck::bytes_of(&self.wave);
         support::run_probe_with("haar", &constants, &sets, push, queries)
     }

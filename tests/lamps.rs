@@ -89,8 +89,8 @@ fn draws(scene: &SceneBuffers, position: [f32; 3]) -> Vec<Answer> {
         Query { position, normal: [0.0, 1.0, 0.0], bits: [a, b] }
     };
     let queries: Vec<Query> = (0..DRAWS).map(query).collect();
-    let constants = [(CONSTANT_SURFACES, scene.surfaces().features)];
-    support::run_probe_with("lamps", &constants, &[scene.set()], &[], &queries)
+    let constants = [(CONSTANT_SURFACES, scene.surfaces.features)];
+    support::run_probe_with("lamps", &constants, &[&scene.set], &[], &queries)
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn lamps_are_drawn_as_their_probabilities_say() {
     let scene = rooms(40);
     let window = Window { x: 0, y: 0, width: 16, height: 16 };
     let buffers = SceneBuffers::new(support::device(), &scene, window).unwrap();
-    assert_ne!(buffers.surfaces().features & SURFACES_LAMP_CELLS, 0);
+    assert_ne!(buffers.surfaces.features & SURFACES_LAMP_CELLS, 0);
     let mut likely = Vec::new();
     // The last place is next to a wall: the lamp beyond it is as near as that of the room.
     for (position, least) in

@@ -186,12 +186,12 @@ impl Paths {
         };
         let waves =
             WaveBuffers::new(device, 64, 1 << 17, 1, size.demand(), Surfaces::default()).unwrap();
-        let kinds = buffers.surfaces();
+        let kinds = buffers.surfaces;
         let traversal =
             Traversal { page_count: 1, page_shift: 20, is_instanced: false, is_on_host: false };
         let steps =
             VisibilitySteps::new(visibility, product, fits.sizes, kinds, traversal, SHADOW_RAYS);
-        let lobes = LobeBuffers::new(device, fits, size, waves.capacity()).unwrap();
+        let lobes = LobeBuffers::new(device, fits, size, waves.capacity).unwrap();
         let wave = Wave {
             pixel_count: surfaces.len() as u32,
             sample_count: 1,
@@ -213,7 +213,7 @@ impl Paths {
     fn run(&self, kernels: Vec<Kernel>) {
         let device = support::device();
         let film = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &self.counters)]).unwrap();
-        let sets = [self.scene.set(), &self.lobes.set, self.waves.set(), &film];
+        let sets = [&self.scene.set, &self.lobes.set, &self.waves.set, &film];
         for kernel in kernels {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
@@ -243,9 +243,9 @@ impl Paths {
     }
 
     fn probe<Q: Pod, A: Pod>(&self, kernel: &str, with_scene: bool, queries: &[Q]) -> Vec<A> {
-        let mut sets = vec![self.waves.set(), &self.lobes.set];
+        let mut sets = vec![&self.waves.set, &self.lobes.set];
         if with_scene {
-            sets.push(self.scene.set());
+            sets.push(&self.scene.set);
         }
         let push = bytemuck::bytes_of(&self.wave);
         support::run_probe_with(kernel, &self.constants(), &sets, push, queries)

@@ -173,7 +173,7 @@ fn a_file_is_decoded_once() {
 fn value(used: &TextureUse, uv: Vec2) -> Vec4 {
     let mut tables = TextureTables::default();
     let index = tables.add(Some(used));
-    let words = tables.words(0..tables.word_count());
+    let words = tables.words(0..tables.word_count);
     twin::texture_value(&words, &tables.uses, index, uv, Vec2::NAN)
 }
 
@@ -450,8 +450,8 @@ fn compare(bits: u32) {
     let uses = uses(&images(numbers), numbers);
     let surfaces = SurfaceTables::new(&materials(&uses));
     let textures = &surfaces.textures;
-    let words = textures.words(0..textures.word_count());
-    for from in (0..textures.word_count()).step_by(50) {
+    let words = textures.words(0..textures.word_count);
+    for from in (0..textures.word_count).step_by(50) {
         let page = textures.words(from..from + 50);
         assert_eq!(page, words[from as usize..words.len().min(from as usize + 50)]);
     }
@@ -643,7 +643,7 @@ fn attributes_are_laid_out_where_materials_need_them() {
     material.surface.normal = Some(TextureUse::new(image));
     let tables = SurfaceTables::new(&[material.clone(), material]);
     assert_eq!(tables.attributes, ATTRIBUTE_FIRST_UVS | ATTRIBUTE_SECOND_UVS | ATTRIBUTE_TANGENT);
-    assert_eq!(tables.textures.word_count(), 1, "an image is there once");
+    assert_eq!(tables.textures.word_count, 1, "an image is there once");
     assert!(tables.textures.check(0).is_ok());
     let accel = Accel::build(&geometry, 1 << 20).unwrap();
     let words = TriangleAttributes::new(&geometry, &accel, tables.attributes).words.len();

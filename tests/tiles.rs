@@ -269,7 +269,7 @@ impl Cache {
             ..SceneParameters::default()
         };
         let tiles = cache.tiles() as u32;
-        let steps = tiles::steps(cache.tiles(), false, scene_buffers.surfaces());
+        let steps = tiles::steps(cache.tiles(), false, scene_buffers.surfaces);
         let buffers = TileBuffers::new(device, &partition, GRID, cache).unwrap();
         buffers.upload(&entries).unwrap();
         Self { scene, partition, entries, buffers, scene_buffers, parameters, steps, tiles }
@@ -282,7 +282,7 @@ impl Cache {
     }
 
     fn probe(&self, queries: &[Query]) -> Vec<Answer> {
-        let sets = [self.scene_buffers.set(), self.buffers.set()];
+        let sets = [&self.scene_buffers.set, self.buffers.set()];
         support::run_probe_with("tiles", &[(CONSTANT_TILES, self.tiles)], &sets, &[], queries)
     }
 }
@@ -371,7 +371,7 @@ fn rays_follow_the_density_that_they_are_divided_by() {
         for kernel in cache.steps.sample(&wave) {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
-            let sets = [cache.scene_buffers.set(), cache.buffers.set(), waves.set()];
+            let sets = [&cache.scene_buffers.set, cache.buffers.set(), &waves.set];
             pass.record(&mut commands, &sets, &wave, None);
             commands.submit_and_wait().unwrap();
         }

@@ -56,7 +56,7 @@ pub(super) fn denoise(denoiser: &Denoiser, film: &Image, path: &Path) -> Result<
         albedo: guides.albedo.as_deref(),
         normal: guides.normal.as_deref(),
     })?;
-    let mut name = format!("Open Image Denoise {}", denoiser.version());
+    let mut name = format!("Open Image Denoise {}", denoiser.version);
     if guides.albedo.is_some() {
         name = format!("{name} with {}", guides.names());
     }

@@ -75,7 +75,7 @@ pub(crate) struct Denoiser {
     device_error: unsafe extern "C" fn(Handle, *mut *const c_char) -> c_int,
     release_device: unsafe extern "C" fn(Handle),
     device: Handle,
-    version: String,
+    pub(crate) version: String,
     path: PathBuf,
     /// Never unloaded: threads of the library may outlive its device.
     _library: ManuallyDrop<Library>,
@@ -121,11 +121,6 @@ impl Denoiser {
         denoiser.version =
             format!("{}.{}.{}", version / 10_000, version / 100 % 100, version % 100);
         Ok(denoiser)
-    }
-
-    /// Version of the library: "2.3.1".
-    pub(crate) fn version(&self) -> &str {
-        &self.version
     }
 
     /// Filters a picture. Fails with [`Error::Denoiser`] for layers of another size than the picture, and

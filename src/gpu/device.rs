@@ -46,7 +46,7 @@ pub struct Device {
     tracer: Tracer,
     embree: Option<Arc<Embree>>,
     pub(super) set_layouts: SetLayouts,
-    pipeline_cache: PipelineCache,
+    pub(super) pipeline_cache: PipelineCache,
     pub(super) pipelines: Pipelines,
     // Emptied in `drop`, before the device is destroyed.
     allocator: Mutex<Option<Allocator>>,
@@ -225,10 +225,6 @@ impl Device {
 
     pub(super) fn queue_family(&self) -> u32 {
         self.capabilities.queue_family.unwrap_or_default()
-    }
-
-    pub(super) fn pipeline_cache(&self) -> vk::PipelineCache {
-        self.pipeline_cache.raw
     }
 
     pub(super) fn allocator(&self) -> MutexGuard<'_, Option<Allocator>> {

@@ -103,7 +103,7 @@ fn compile(
     let queue = device.idle_queue();
     // SAFETY: module, layout and cache are alive; the module is not needed afterwards.
     let result = unsafe {
-        let result = raw_device.create_compute_pipelines(device.pipeline_cache(), &info, None);
+        let result = raw_device.create_compute_pipelines(device.pipeline_cache.raw, &info, None);
         raw_device.destroy_shader_module(module, None);
         result
     };

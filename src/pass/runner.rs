@@ -93,15 +93,15 @@ impl Runner {
             settings.aovs,
             &scene.light_groups.names()[..settings.light_groups as usize],
             settings.film_page_bytes,
-            (waves.capacity() / padded_pixels).max(1),
+            (waves.capacity / padded_pixels).max(1),
         )?;
         let sharing = (cohort_pixels > 1)
-            .then(|| sharing_set(device, waves.capacity(), cohort_pixels))
+            .then(|| sharing_set(device, waves.capacity, cohort_pixels))
             .transpose()?;
         Ok(Self {
             device: Arc::clone(device),
             scene,
-            wave_paths: FIRST_PATHS.min(waves.capacity()),
+            wave_paths: FIRST_PATHS.min(waves.capacity),
             waves,
             sharing,
             film,
@@ -321,7 +321,7 @@ impl Runner {
             let shrink = 0.75 * LONG_DISPATCH_MS / longest;
             self.wave_paths = ((f64::from(paths) * shrink) as u32).max(BLOCK_PIXELS);
         } else if longest < SHORT_DISPATCH_MS && paths >= self.wave_paths / 2 {
-            self.wave_paths = self.wave_paths.saturating_mul(2).min(self.waves.capacity());
+            self.wave_paths = self.wave_paths.saturating_mul(2).min(self.waves.capacity);
         }
     }
 
@@ -379,7 +379,7 @@ impl Runner {
     /// Device memory by buffer, bytes.
     pub(crate) fn buffer_bytes(&self) -> BTreeMap<String, u64> {
         let mut bytes = self.film.buffer_bytes();
-        let sets = [self.scene.set(), self.waves.set()].into_iter().chain(&self.sharing);
+        let sets = [&self.scene.set, &self.waves.set].into_iter().chain(&self.sharing);
         bytes.extend(sets.flat_map(DescriptorSet::buffer_bytes));
         bytes
     }
@@ -407,6 +407,6 @@ fn sets<'a>(
     sharing: &'a Option<DescriptorSet>,
     film: &'a DescriptorSet,
 ) -> Vec<&'a DescriptorSet> {
-    let common = [scene.set(), waves.set(), film];
+    let common = [&scene.set, &waves.set, film];
     common.into_iter().chain(technique.set()).chain(sharing).collect()
 }

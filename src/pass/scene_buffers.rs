@@ -33,13 +33,15 @@ use crate::{
 
 /// A scene on a device: geometry, materials, environment and camera.
 pub struct SceneBuffers {
-    set: DescriptorSet,
+    /// Descriptor set 0.
+    pub set: DescriptorSet,
     /// Tree and triangles.
     pub(crate) geometry: GeometryBuffers,
     /// [`SceneParameters`].
     pub(crate) parameter_buffer: Buffer,
     parameters: SceneParameters,
-    surfaces: Surfaces,
+    /// Specialization of passes by the surfaces of the scene.
+    pub surfaces: Surfaces,
     /// Part of the film that the parameters describe.
     pub(crate) window: Window,
     /// Groups of the scene's lights.
@@ -194,22 +196,12 @@ impl SceneBuffers {
         self.parameter_buffer.upload(bytemuck::bytes_of(&parameters))
     }
 
-    /// Descriptor set 0.
-    pub fn set(&self) -> &DescriptorSet {
-        &self.set
-    }
-
     /// Filter of the film.
     pub(crate) fn filter(&self) -> Filter {
         match self.parameters.film_filter {
             FILTER_GAUSSIAN => Filter::Gaussian,
             _ => Filter::Box,
         }
-    }
-
-    /// Specialization of passes by the surfaces of the scene.
-    pub fn surfaces(&self) -> Surfaces {
-        self.surfaces
     }
 }
 

@@ -63,7 +63,7 @@ impl TextureBuffers {
             )));
         }
         let page_words = 1_u64 << shift;
-        let texture_pages = (0..tables.textures.word_count().div_ceil(page_words).max(1))
+        let texture_pages = (0..tables.textures.word_count.div_ceil(page_words).max(1))
             .map(|page| {
                 let words = tables.textures.words(page * page_words..(page + 1) * page_words);
                 Buffer::texels_from_slice(device, &format!("textures {page}"), &words)

@@ -32,8 +32,10 @@ pub(crate) fn path_list_bytes(paths: u64) -> u64 {
 
 /// Rays, hits, shadow rays and path states of one wave.
 pub struct WaveBuffers {
-    set: DescriptorSet,
-    capacity: u32,
+    /// Descriptor set 2.
+    pub set: DescriptorSet,
+    /// Largest number of paths in a wave.
+    pub capacity: u32,
     /// Buffers that passes answer in, or the host where it traces.
     pub answers: Answers,
 }
@@ -110,15 +112,5 @@ impl WaveBuffers {
         ];
         let set = DescriptorSet::new(device, &WAVE, &bound)?;
         Ok(Self { set, capacity, answers })
-    }
-
-    /// Descriptor set 2.
-    pub fn set(&self) -> &DescriptorSet {
-        &self.set
-    }
-
-    /// Largest number of paths in a wave.
-    pub fn capacity(&self) -> u32 {
-        self.capacity
     }
 }

@@ -81,7 +81,7 @@ impl Renderer {
             "buffers belong to one window"
         );
 
-        let surfaces = buffers.surfaces();
+        let surfaces = buffers.surfaces;
         let shares = settings.depth > 1 && surfaces.can_share();
         let cohort_edge = settings.sampler.cohort_edge(&settings.parameters);
         let cohort_edge = if shares { cohort_edge } else { 1 };

@@ -34,7 +34,8 @@ pub struct TextureTables {
     pub uses: Vec<structs::TextureUse>,
     images: Vec<(u64, Arc<Texture>)>,
     places: HashMap<*const Texture, u64>,
-    word_count: u64,
+    /// Words of all texels.
+    pub word_count: u64,
 }
 
 impl TextureTables {
@@ -60,11 +61,6 @@ impl TextureTables {
             bias: used.bias,
         });
         self.uses.len() as u32 - 1
-    }
-
-    /// Words of all texels.
-    pub fn word_count(&self) -> u64 {
-        self.word_count
     }
 
     /// Checks that the texels fit into [`MAX_PAGES`] pages.

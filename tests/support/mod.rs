@@ -85,7 +85,7 @@ impl PathInput {
             Pipeline::new(device(), "product_state", &spirv("product_state"), &[]).unwrap();
         let film = DescriptorSet::new(device(), &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
         let mut commands = Commands::begin(device()).unwrap();
-        commands.dispatch(&pipeline, &[waves.set(), &film], &[], inputs.len() as u32);
+        commands.dispatch(&pipeline, &[&waves.set, &film], &[], inputs.len() as u32);
         commands.submit_and_wait().unwrap();
     }
 }

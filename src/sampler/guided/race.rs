@@ -134,7 +134,7 @@ impl Work {
 impl Race<'_> {
     /// True if a wave has room for a block.
     pub(super) fn fits(runner: &Runner) -> bool {
-        runner.waves.capacity() >= SAMPLES * BLOCK_PIXELS
+        runner.waves.capacity >= SAMPLES * BLOCK_PIXELS
     }
 
     /// Races `contenders`, of which the first is in use. Returns the winner, the costs of all and the
@@ -209,7 +209,7 @@ impl Race<'_> {
     fn waves(&self, runner: &Runner, progress: &Progress, blocks: Blocks, round: u32) -> Vec<Wave> {
         let first_sample = progress.next_sample().wrapping_add(round * SAMPLES);
         let start = round * (blocks.starts / MOST_ROUNDS).max(1) % blocks.starts;
-        let together = runner.waves.capacity() / SAMPLES / BLOCK_PIXELS;
+        let together = runner.waves.capacity / SAMPLES / BLOCK_PIXELS;
         let wave = |first: u32| Wave {
             first_pixel: (start + first * blocks.stride) * BLOCK_PIXELS,
             pixel_count: together.min(blocks.count - first) * BLOCK_PIXELS,

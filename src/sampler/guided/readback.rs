@@ -62,7 +62,7 @@ impl Guided {
         let (column, row) = (x.wrapping_sub(window.x), y.wrapping_sub(window.y));
         assert!(column < window.width && row < window.height, "a pixel of the window");
         let per_group = runner.last_group_rays(self.steps());
-        let samples = rays.div_ceil(per_group.max(1)).clamp(1, runner.waves.capacity());
+        let samples = rays.div_ceil(per_group.max(1)).clamp(1, runner.waves.capacity);
         let first_sample = progress.next_sample();
         let wave = Wave {
             first_pixel: position_in_film_order(window, column, row),

@@ -67,7 +67,7 @@ impl Room for GuidedRoom {
         let own = parameters.guided;
         let size = GuideSize {
             pixels: runner.film().padded_pixels(),
-            paths: runner.waves.capacity(),
+            paths: runner.waves.capacity,
             shadow_rays: settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP),
             has_bounces: own.guides_bounces(settings.depth),
         };

@@ -53,7 +53,7 @@ impl Room for HaarRoom {
         let (surfaces, shadow_rays) = (settings.surfaces, settings.shadow_rays);
         let steps = HaarSteps::new(parameters, tree.depth, surfaces, shadow_rays);
         let size = NodeSize::new(parameters, shadow_rays);
-        let nodes = NodeBuffers::new(&runner.device, &tree, size, runner.waves.capacity())?;
+        let nodes = NodeBuffers::new(&runner.device, &tree, size, runner.waves.capacity)?;
         let host_ms = [("environment tree".to_owned(), tree_ms)].into();
         Ok(Box::new(Unlearned { steps, set: Some(nodes.set), host_ms }))
     }

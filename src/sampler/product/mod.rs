@@ -48,7 +48,7 @@ impl Room for ProductRoom {
         let parameters = parameters.product;
         let fits = Fits::new(&runner.device, scene, &parameters)?;
         let steps = ProductSteps::new(parameters, fits.sizes, runner.settings.surfaces);
-        let paths = runner.waves.capacity();
+        let paths = runner.waves.capacity;
         let lobes = LobeBuffers::new(&runner.device, fits, size(&parameters), paths)?;
         Ok(Box::new(Product { steps, lobes }))
     }

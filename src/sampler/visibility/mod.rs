@@ -72,7 +72,7 @@ impl Room for VisibilityRoom {
         let cached_pixels = (parameters.visibility.cache == CacheScope::Pixel)
             .then(|| u64::from(window.width) * u64::from(window.height));
         let size = LobeSize { cached_pixels, ..size(parameters, settings.shadow_rays) };
-        let paths = runner.waves.capacity();
+        let paths = runner.waves.capacity;
         Ok(Box::new(Visibility {
             steps,
             lobes: LobeBuffers::new(&runner.device, fits, size, paths)?,
