@@ -3,16 +3,7 @@
 
 #include "haar/mixture.glsl"
 #include "test/answers.glsl"
-
-struct HaarQuery {
-    uint path;
-    // 1 draws a direction from the numbers, 0 takes the given one.
-    uint draws;
-    vec3 direction;
-    float technique;
-    vec2 direction_numbers;
-    float lobe;
-};
+#include "test/mixture_query.glsl"
 
 struct HaarAnswer {
     vec3 direction;
@@ -26,16 +17,14 @@ struct HaarAnswer {
     vec3 integrand;
 };
 
-HaarAnswer answer(HaarQuery query) {
+HaarAnswer answer(MixtureQuery query) {
     Vertex vertex = load_vertex(query.path, load_hit(query.path));
     HaarMixture mixture = load_haar_mixture(query.path, wave_path_count());
     NodeSample drawn = NodeSample(
         query.direction,
         nodes_pdf(mixture.path, mixture.path_count, mixture.total, query.direction));
     if (query.draws != 0u) {
-        MixtureNumbers numbers =
-            MixtureNumbers(query.technique, query.direction_numbers, query.lobe);
-        drawn = haar_sample(vertex, mixture, numbers);
+        drawn = haar_sample(vertex, mixture, numbers_of(query));
     }
     DirectionSample sampled = evaluate_world(vertex, drawn.direction);
     return HaarAnswer(
@@ -44,4 +33,4 @@ HaarAnswer answer(HaarQuery query) {
         sampled.brdf_pdf, mixture.total, sampled.integrand);
 }
 
-ANSWER_QUERIES(HaarQuery, HaarAnswer, answer)
+ANSWER_QUERIES(MixtureQuery, HaarAnswer, answer)

@@ -7,16 +7,7 @@ READS(visibility_cache)
 READS(close_lobes)
 
 #include "product/mixture.glsl"
-
-struct MixtureQuery {
-    uint path;
-    // 1 draws a direction from the numbers, 0 takes the given one.
-    uint draws;
-    vec3 direction;
-    float technique;
-    vec2 direction_numbers;
-    float lobe;
-};
+#include "test/mixture_query.glsl"
 
 struct MixtureAnswer {
     vec3 direction;
@@ -37,9 +28,7 @@ MixtureAnswer answer(MixtureQuery query) {
     Mixture mixture = load_mixture(query.path, wave_path_count(), 0u);
     vec3 direction = query.direction;
     if (query.draws != 0u) {
-        MixtureNumbers numbers =
-            MixtureNumbers(query.technique, query.direction_numbers, query.lobe);
-        direction = mixture_sample(vertex, mixture, 0u, numbers);
+        direction = mixture_sample(vertex, mixture, 0u, numbers_of(query));
     }
     float sum = 0.0;
     float unguided = 0.0;
