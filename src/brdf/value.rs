@@ -29,11 +29,6 @@ fn principled_value(material: &Material, reflection: f32, cosine_difference: f32
     mix_vec3(base + reflection * dielectric, reflection * metal, metallic)
 }
 
-/// Tests for a material that scatters alike to all directions of a side.
-fn is_diffuse(material: &Material) -> bool {
-    matches!(material.kind, MATERIAL_DIFFUSE | MATERIAL_DIFFUSE_TRANSMISSION)
-}
-
 /// Material and outgoing direction at a sheet from whose other side the viewer looks: it shows there what it
 /// transmits, over the probability of that side. All others as they are.
 pub fn of_side(material: &Material, outgoing_local: Vec3) -> (Material, Vec3) {
@@ -62,7 +57,7 @@ pub fn brdf_evaluate(
         return Vec3::ZERO;
     }
     let reflectance = Vec3::from(material.reflectance);
-    if is_diffuse(material) {
+    if matches!(material.kind, MATERIAL_DIFFUSE | MATERIAL_DIFFUSE_TRANSMISSION) {
         return reflectance / PI;
     }
     if material.kind == MATERIAL_MEASURED {

@@ -53,7 +53,12 @@ impl Worker {
                 let depth = self.parts.settings.depth.saturating_add_signed(more).clamp(1, 64);
                 if depth != self.parts.settings.depth {
                     self.parts.settings.depth = depth;
-                    self.remake()?;
+                    self.keep_guide()?;
+                    self.parts.left = self.make_side(self.parts.left.sampler)?;
+                    if self.right.take().is_some() {
+                        self.right = Some(self.make_side(self.right_sampler)?);
+                    }
+                    self.look(self.whole(), true)?;
                 }
             }
             Action::Split => {
@@ -192,16 +197,6 @@ impl Worker {
         } else if sampler != self.parts.left.sampler {
             self.keep_guide()?;
             self.parts.left = self.make_side(sampler)?;
-        }
-        self.look(self.whole(), true)
-    }
-
-    /// Makes all renderers again, with settings that changed.
-    fn remake(&mut self) -> Result<()> {
-        self.keep_guide()?;
-        self.parts.left = self.make_side(self.parts.left.sampler)?;
-        if self.right.take().is_some() {
-            self.right = Some(self.make_side(self.right_sampler)?);
         }
         self.look(self.whole(), true)
     }
