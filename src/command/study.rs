@@ -172,7 +172,7 @@ pub fn run_with<O: Observer>(
         super::print_line(&format!("{:#}", serde_json::json!(report)))?;
     }
     if !arguments.quiet {
-        say!("wrote {}", folder.path().join("index.html").display());
+        say!("wrote {}", folder.path.join("index.html").display());
     }
     if arguments.validate { device.check_validation() } else { Ok(()) }
 }

@@ -111,17 +111,17 @@ impl Commands {
         assert!(
             groups <= self.device.capabilities().max_workgroup_count,
             "{}: {groups} workgroups are too many",
-            pipeline.name()
+            pipeline.name
         );
-        assert!(push_constants.len() <= 128, "{}: too many push constants", pipeline.name());
+        assert!(push_constants.len() <= 128, "{}: too many push constants", pipeline.name);
         let raw = &self.device.raw;
-        labels::begin(&self.device, self.raw, pipeline.name());
+        labels::begin(&self.device, self.raw, &pipeline.name);
         self.barrier(
             vk::PipelineStageFlags::COMPUTE_SHADER,
             vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE,
         );
         if let Some(timestamps) = &mut self.timestamps {
-            timestamps.start(pipeline.name(), invocations);
+            timestamps.start(&pipeline.name, invocations);
         }
         // SAFETY: the command buffer is recording; pipeline, layout and sets belong to the device
         // and the caller keeps them alive until the submission has been waited for.
@@ -152,7 +152,7 @@ impl Commands {
             timestamps.stop();
         }
         labels::end(&self.device, self.raw);
-        pipeline.name().clone_into(&mut self.last_pass);
+        pipeline.name.clone_into(&mut self.last_pass);
     }
 
     /// Fills a whole buffer with a repeated 32-bit word.

@@ -12,7 +12,7 @@ use crate::{error::Result, shader::spirv::used_bindings, stage};
 /// A compute pipeline.
 pub struct Pipeline {
     pub(super) made: Made,
-    name: String,
+    pub(super) name: String,
     /// Keeps the pipeline's owner.
     _device: Arc<Device>,
 }
@@ -32,10 +32,6 @@ impl Pipeline {
         let key = (name, spirv, constants);
         let made = device.pipelines.get_or_make(key, || make(device, name, spirv, constants))?;
         Ok(Self { made, name: name.to_owned(), _device: Arc::clone(device) })
-    }
-
-    pub(crate) fn name(&self) -> &str {
-        &self.name
     }
 
     /// Returns true if the shader uses buffers of this descriptor set.

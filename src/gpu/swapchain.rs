@@ -42,7 +42,8 @@ pub(crate) struct Swapchain {
     surface: vk::SurfaceKHR,
     raw: vk::SwapchainKHR,
     images: Vec<vk::Image>,
-    size: [u32; 2],
+    /// Width and height of the images; zeros while nothing can be shown.
+    pub(crate) size: [u32; 2],
     /// True if the bytes of a pixel are blue, green, red, else red, green, blue; the fourth is unused.
     pub(crate) is_bgra: bool,
     acquired: vk::Fence,
@@ -188,11 +189,6 @@ impl Swapchain {
         self.size = [extent.width, extent.height];
         self.is_bgra = format.format == vk::Format::B8G8R8A8_UNORM;
         Ok(())
-    }
-
-    /// Width and height of the images; zeros while nothing can be shown.
-    pub(crate) fn size(&self) -> [u32; 2] {
-        self.size
     }
 
     /// Shows the pixels of a buffer, four bytes each, row by row from the top.

@@ -33,7 +33,7 @@ const FORMAT: &str = "fenestra study 3";
 /// A report folder.
 #[derive(Clone, Debug)]
 pub struct Folder {
-    path: PathBuf,
+    pub(crate) path: PathBuf,
     /// The mark, locked while a study writes here; the system unlocks it when the program ends.
     _lock: Option<Arc<File>>,
 }
@@ -123,10 +123,6 @@ impl Folder {
         check_replaces_nothing_in("the report in", &self.path, inputs)
     }
 
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
-    }
-
     pub(crate) fn run(&self, scene: &str, stem: &str) -> PathBuf {
         self.path.join("runs").join(scene).join(format!("{stem}.json"))
     }
@@ -173,9 +169,9 @@ mod tests {
         let path = folder.run("room", "mis-4spp-seed1");
         assert_eq!(folder.read_json::<Vec<u32>>(&path).unwrap(), None);
         write_json(&path, &[1, 2, 3]).unwrap();
-        let other = Folder::open(folder.path()).unwrap_err().to_string();
+        let other = Folder::open(&folder.path).unwrap_err().to_string();
         assert!(other.contains("another study is at work"), "{other}");
-        let folder_path = folder.path().to_path_buf();
+        let folder_path = folder.path.clone();
         drop(folder);
         let again = Folder::open(&folder_path).unwrap();
         assert_eq!(again.read_json(&path).unwrap(), Some(vec![1, 2, 3]));

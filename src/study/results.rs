@@ -157,8 +157,8 @@ impl Report {
     /// # Errors
     /// [`crate::Error::Io`] with the cause.
     pub(crate) fn write(&self, folder: &Folder) -> Result<()> {
-        write_json(&folder.path().join("results.json"), self)?;
-        write_text(&folder.path().join("results.csv"), &self.csv())
+        write_json(&folder.path.join("results.json"), self)?;
+        write_text(&folder.path.join("results.csv"), &self.csv())
     }
 
     /// Formats a row for every run and rule; columns of figures that a run lacks are empty.

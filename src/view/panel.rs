@@ -147,7 +147,7 @@ impl Panel {
     pub(crate) fn present(&mut self) -> Result<()> {
         // Twice: a window may change its size or lose its surface once in between.
         for _ in 0..2 {
-            let size = self.swapchain.size();
+            let size = self.swapchain.size;
             if size.contains(&0) {
                 return Ok(());
             }
@@ -170,7 +170,7 @@ impl Panel {
     /// Returns what the window shows without controls: its width, and red, green, blue of each pixel. Fails
     /// if the device does.
     pub(crate) fn picture(&mut self) -> Result<(u32, Vec<[u8; 3]>)> {
-        let mut size = self.swapchain.size();
+        let mut size = self.swapchain.size;
         if size.contains(&0) {
             return Err(Error::usage("the window has no pixels to write"));
         }

@@ -68,7 +68,7 @@ pub fn write(report: &Report, folder: &Folder) -> Result<()> {
         .replace("{{script}}", include_str!("page.js"))
         .replace("{{pictures}}", &style)
         .replace("{{body}}", &body);
-    write_text(&folder.path().join("index.html"), &page)
+    write_text(&folder.path.join("index.html"), &page)
 }
 
 /// A section under a heading, opened by `about`; nothing without tables.

@@ -103,7 +103,7 @@ pub fn load(
             let is_own = |run: &&Run| run.scene == scene.name && run.sampler == *sampler;
             for run in report.runs.iter().filter(is_own) {
                 let Some(name) = run.at(*rule).and_then(|m| m.image.as_ref()) else { continue };
-                let path = folder.path().join(name);
+                let path = folder.path.join(name);
                 let picture = Image::read_exr(&path)?.rgb(&path)?;
                 for (sum, error) in sum.iter_mut().zip(squared_errors(&picture, &first, &second)?) {
                     *sum += error;
