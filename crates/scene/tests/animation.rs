@@ -37,6 +37,11 @@ fn the_camera_follows_its_key_frames() {
     let first = at("room.toml", &focused, Some(1.0)).unwrap().camera;
     assert_eq!(first.focus_distance, 3.0, "that of the camera");
 
+    let keys = "position = [2, 1, 5], up = [1, 1, 0], vertical_fov_deg = 50 }";
+    let leaning = ROOM.replace("position = [2, 1, 5] }", keys);
+    let first = at("room.toml", &leaning, Some(1.0)).unwrap().camera;
+    assert_eq!((first.up, first.vertical_fov_deg), (Vec3::new(1.0, 1.0, 0.0), 50.0));
+
     let [one, other] = [1.0, 2.0].map(|time| at("room.toml", ROOM, Some(time)).unwrap());
     assert_ne!(one.hash, other.hash);
     assert_eq!(still_hash(&one), still_hash(&other), "the camera alone moves");

@@ -195,6 +195,23 @@ fn cornell_constant_samples_give_a_constant_grid() {
     }
 }
 
+/// Samples of light that goes on past the normal, and of light that goes back, at several turns.
+#[test]
+fn cornell_samples_lie_at_their_azimuths() {
+    let mut text = String::from("3\n450 550 650\n");
+    for (step, past, value) in (0..8).flat_map(|step| [(step, 0.5 * TAU, 0.2), (step, 0.0, 0.02)]) {
+        let turn = 0.7 * f64::from(step);
+        text += &format!("0.8 {turn} 0.8 {}  {value} {value} {value}\n", turn + past);
+    }
+    let table = MeasuredTable::load(&Folder::new().write("a.brdf", text)).unwrap();
+    let (sine, cosine) = 0.8_f32.sin_cos();
+    let incident = Vec3::new(sine, 0.0, cosine);
+    for (outgoing, expected) in [(incident.with_x(-sine), 0.2), (incident, 0.02)] {
+        let luminance = table.evaluate(outgoing, incident).dot(Vec3::new(0.2126, 0.7152, 0.0722));
+        assert!((luminance / expected - 1.0).abs() < 0.05, "{luminance}, not {expected}");
+    }
+}
+
 #[test]
 fn cornell_records_that_cannot_be_used_are_counted() {
     let folder = Folder::new();

@@ -48,6 +48,29 @@ fn compressed_meshes_are_what_they_were() {
     }
 }
 
+/// Bytes of a file with another text in its document.
+fn changed(whole: &[u8], from: &str, to: &str) -> Vec<u8> {
+    let json = 20 + u32::from_le_bytes(whole[12..16].try_into().unwrap()) as usize;
+    let text = std::str::from_utf8(&whole[20..json]).unwrap();
+    assert!(text.contains(from), "{from}: {text}");
+    let mut text = text.replace(from, to);
+    text.extend(std::iter::repeat_n(' ', text.len().next_multiple_of(4) - text.len()));
+    let mut changed = whole[..20].to_vec();
+    changed[12..16].copy_from_slice(&(text.len() as u32).to_le_bytes());
+    changed.extend(text.bytes());
+    changed.extend(&whole[json..]);
+    let length = changed.len() as u32;
+    changed[8..12].copy_from_slice(&length.to_le_bytes());
+    changed
+}
+
+/// Accessors of Draco's attributes may say where readers without it find the values.
+#[test]
+fn places_beside_compressed_values_do_not_count() {
+    let placed = changed(DRACO, "\"count\":25", "\"count\":25,\"byteOffset\":12");
+    assert_eq!(read(&placed).positions, read(DRACO).positions);
+}
+
 #[test]
 fn damaged_meshes_are_refused_or_read() {
     let folder = Folder::new();
@@ -76,18 +99,8 @@ fn damaged_meshes_are_refused_or_read() {
         (MESHOPT, "\"byteLength\":49,", "\"byteLength\":4900,", "truncated: needs 4900 bytes"),
     ];
     for (whole, from, to, expected) in cases {
-        let json = 20 + u32::from_le_bytes(whole[12..16].try_into().unwrap()) as usize;
-        let text = std::str::from_utf8(&whole[20..json]).unwrap();
-        assert!(text.contains(from), "{from}: {text}");
-        let mut text = text.replace(from, to);
-        text.extend(std::iter::repeat_n(' ', text.len().next_multiple_of(4) - text.len()));
-        let mut changed = whole[..20].to_vec();
-        changed[12..16].copy_from_slice(&(text.len() as u32).to_le_bytes());
-        changed.extend(text.bytes());
-        changed.extend(&whole[json..]);
-        let length = changed.len() as u32;
-        changed[8..12].copy_from_slice(&length.to_le_bytes());
-        let found = Mesh::read(&folder.write("a.glb", changed), &mut Vec::new()).unwrap_err();
+        let path = folder.write("a.glb", changed(whole, from, to));
+        let found = Mesh::read(&path, &mut Vec::new()).unwrap_err();
         assert!(found.to_string().contains(expected), "{found}");
     }
 }

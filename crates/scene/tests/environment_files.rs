@@ -428,6 +428,12 @@ fn procedural_maps_are_lit_as_their_names_say() {
         let found = sky.radiance(direction);
         assert!(found.abs_diff_eq(expected.into(), 0.03), "{found} instead of {expected:?}");
     }
+    // The horizon fades into the ground over 2°.
+    for (down_deg, share) in [(1.0_f32, 0.5), (3.0, 1.0)] {
+        let found = sky.radiance(opposite.with_y(-down_deg.to_radians().tan()).normalize());
+        let expected = Vec3::from(horizon).lerp(ground.into(), share);
+        assert!(found.abs_diff_eq(expected, 0.03), "{down_deg}°: {found} instead of {expected}");
+    }
     // The glow falls to 1/e of its 1.5 in 0.17 rad.
     let even = SkyParameters { zenith: [1.0; 3], horizon: [1.0; 3], ..parameters };
     let even =
@@ -443,6 +449,16 @@ fn procedural_maps_are_lit_as_their_names_say() {
     // A gateway in the facade toward −Z, 45 m away, is a round arch of 9 m that shows the sky.
     let facade = |height: f32| luminance(court.radiance(Vec3::new(0.0, height - 1.7, -45.0)));
     assert!(facade(8.0) > 5.0 && facade(10.0) < 1.0, "{} {}", facade(8.0), facade(10.0));
+    // Where all windows glint, a line through one column of panes meets one in each storey.
+    let glints = CourtParameters { glint_share: 1.0, ..CourtParameters::default() };
+    let glints = EnvironmentMap::court(&glints, 1.0).unwrap();
+    let facade = (0..950).map(|step| {
+        let way = Vec3::new(9.0, 0.02 * step as f32 - 1.7, 0.225).normalize();
+        luminance(glints.radiance(way)) > 5.0
+    });
+    let facade: Vec<bool> = facade.collect();
+    let windows = facade.windows(2).filter(|pair| !pair[0] && pair[1]).count();
+    assert_eq!(windows, 3, "{facade:?}");
     let paving = |side: f32| flux(&court, |way| way.y < -0.3 && side * way.x > 0.0);
     assert!((paving(1.0) / paving(-1.0) - 1.0).abs() < 0.1, "{} {}", paving(1.0), paving(-1.0));
     let sky_share = flux(&court, |direction| direction.y > 0.7) / flux(&court, |_| true);

@@ -5,6 +5,7 @@
 use fenestra_scene::{
     Geometry, Scene,
     export::{Settings, gltf, mitsuba, pbrt},
+    lamp::LampKind,
     load::LoadOptions,
     material::MaterialKind,
     math::colour::luminance,
@@ -143,8 +144,10 @@ fn gltf_keeps_dielectrics_cutoffs_and_skies() {
     let ours = Scene::load(&path).unwrap();
     let path = folder.path().join("a.gltf");
     gltf::export(&ours, &path).write().unwrap();
-    let environment = Some(folder.path().join("a/environment.exr"));
-    let read = Scene::load_with(&path, &LoadOptions { environment, ..Default::default() }).unwrap();
+    let map = folder.path().join("a/environment.exr");
+    let options = LoadOptions { environment: Some(map.clone()), ..Default::default() };
+    let read = Scene::load_with(&path, &options).unwrap();
+    assert!(read.inputs.contains(&map), "{:?}", read.inputs);
     assert_eq!(read.environment.texels, ours.environment.texels);
     let kind = |scene: &Scene| format!("{:?}", scene.materials[0].kind);
     assert_eq!(kind(&read), kind(&ours));
@@ -160,6 +163,45 @@ fn gltf_keeps_dielectrics_cutoffs_and_skies() {
     let used: Vec<_> = used.split('"').filter(|name| name.starts_with("KHR")).collect();
     let expected = ["lights_punctual", "materials_ior", "materials_specular", "texture_transform"];
     assert_eq!(used, expected.map(|name| format!("KHR_{name}")));
+}
+
+#[test]
+fn absorption_views_and_spots_come_back() {
+    let folder = Folder::new();
+    let clay = "type = \"dielectric\"\nabsorption = [4, 2, 0]\n[[lamp]]\ntype = \"spot\"\n\
+                position = [1, 2, 3]\ndirection = [0, -1, 0]\nintensity = [4, 5, 6]\n\
+                inner_angle_deg = 10\nouter_angle_deg = 30";
+    let mut scene = square(&folder, clay);
+    // The shorter side of the film is its width.
+    scene.film.width = 3;
+    for (_, read) in again(&folder, &scene) {
+        let absorption = read.materials[0].kind.absorption().unwrap();
+        assert!(absorption.abs_diff_eq(Vec3::new(4.0, 2.0, 0.0), 1e-4), "{absorption}");
+        let angle = read.camera.vertical_fov_deg;
+        assert!((angle - 45.0).abs() < 1e-3, "{angle}");
+        let LampKind::Spot(spot) = read.lamps[0].kind else { panic!("{:?}", read.lamps) };
+        let angles = [spot.inner_angle_rad, spot.outer_angle_rad].map(f32::to_degrees);
+        assert!((angles[0] - 10.0).abs().max((angles[1] - 30.0).abs()) < 1e-3, "{angles:?}");
+    }
+}
+
+#[test]
+fn cut_surfaces_and_opacities_as_colours_come_back_from_pbrt() {
+    let folder = Folder::new();
+    let read = |clay: &str| {
+        let [_, (_, read)] = again(&folder, &square(&folder, clay));
+        read.materials[0].surface.clone()
+    };
+    // An opacity at the cutoff is that of an opaque surface.
+    let clay = "type = \"diffuse\"\nreflectance = [0, 0, 0]\nopacity_cutoff = 0.5\nopacity = ";
+    let opacity = |factor: &str| read(&format!("{clay}{factor}")).opacity.factor;
+    assert_eq!([opacity("0.5"), opacity("0.4")], [1.0, 0.0]);
+    // Opacity is linear, although the image is one of colours.
+    let image = folder.path().join("b.png");
+    image::save_buffer(image, &[9, 9, 9, 128], 1, 1, image::ColorType::Rgba8).unwrap();
+    let clay = "type = \"diffuse\"\nreflectance = { texture = \"b.png\", channel = \"a\" }";
+    let value = read(clay).color.unwrap().values()[0][0];
+    assert!((value - 128.0 / 255.0).abs() < 1e-3, "{value}");
 }
 
 /// Light of both sides of a sheet comes back, one colour and an image as well.

@@ -4,7 +4,7 @@
 
 use std::{fmt::Write, path::Path};
 
-use fenestra_scene::{Scene, instance::PLACED_TRIANGLES};
+use fenestra_scene::{Geometry, Scene, instance::PLACED_TRIANGLES};
 use glam::Vec3;
 
 use crate::support::{
@@ -241,14 +241,19 @@ fn gltf_instances_of_a_node() {
 #[test]
 fn included_gltf_nodes() {
     let folder = Folder::new();
-    let room = |uses: usize| -> Scene {
+    let room = |uses: usize, rest: &str| -> Scene {
         folder.write("nodes.gltf", nested_nodes(uses));
         let text = "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\n\
              vertical_fov_deg = 45\n             [environment]\nconstant = [1, 1, 1]\n\
              [[include]]\nfile = \"nodes.gltf\"\nscale = [1, 2, 1]\nrotate_deg = [30, 0, 0]\n\
              translate = [0, 3, 1]\n";
-        let path = folder.write("room.toml", text);
+        let path = folder.write("room.toml", format!("{text}{rest}"));
         Scene::load(Path::new(&path)).unwrap_or_else(|error| panic!("{error}"))
     };
-    compare_scenes(&room(FEW), &room(MANY), MANY);
+    compare_scenes(&room(FEW, ""), &room(MANY, ""), MANY);
+    // In the place of the file's, a material that emits is placed with its triangles.
+    let lit = "materials = { \"material 0\" = \"lit\" }\n[[material]]\nname = \"lit\"\n\
+               type = \"diffuse\"\nreflectance = [0, 0, 0]\nemission = [1, 1, 1]\n";
+    let Geometry { instances, triangles, .. } = room(MANY, lit).geometry;
+    assert_eq!((instances.len(), triangles.len()), (0, MANY * TRIANGLES));
 }

@@ -5,6 +5,7 @@ use fenestra_scene::{
     Geometry,
     coat::{albedo_below_coat, base_below_coat},
     geometry::Dropped,
+    instance::Instance,
     math::equal_area::{direction_from_square, square_from_direction},
     mesh::Mesh,
     transform::Transform,
@@ -67,6 +68,16 @@ fn corner_mesh() -> Mesh {
 }
 
 #[test]
+fn boxes_of_instances_have_eight_corners() {
+    let place = Transform::new([2.0, 1.0, 1.0], [0.0; 3], [0.0, 0.0, 5.0]);
+    let instance = Instance::new(0, &place, 0, true).unwrap();
+    let mut corners = instance.corners([Vec3::ZERO, Vec3::ONE]).map(|corner| corner.to_array());
+    corners.sort_by(|a, b| a.partial_cmp(b).unwrap());
+    let expected = [0.0, 2.0].map(|x| [0.0, 1.0].map(|y| [5.0, 6.0].map(|z| [x, y, z])));
+    assert_eq!(corners, expected.as_flattened().as_flattened());
+}
+
+#[test]
 fn bad_triangles_are_dropped_and_counted() {
     let mut mesh = corner_mesh();
     mesh.positions.push([f32::NAN, 0.0, 0.0]);
@@ -92,6 +103,15 @@ fn normals_that_are_not_finite_mark_flat_shading() {
     assert_eq!(geometry.append(&mesh, &place, |_| 0).normals, 1);
     let expected = [[0.0, 0.0, 1.0], [0.0; 3], [0.0; 3], [0.0, 0.0, 1.0]];
     assert_eq!(geometry.normals, expected);
+}
+
+#[test]
+fn colours_of_vertices_lie_from_black_to_white() {
+    let mut mesh = corner_mesh();
+    mesh.colors = vec![[2.0, -1.0, 0.5, 3.0], [f32::NAN; 4], [0.25; 4], [0.0; 4]];
+    let mut geometry = Geometry::default();
+    geometry.append(&mesh, &Transform::new([1.0; 3], [0.0; 3], [0.0; 3]), |_| 0);
+    assert_eq!(geometry.colors, [[1.0, 0.0, 0.5, 1.0], [1.0; 4], [0.25; 4], [0.0; 4]]);
 }
 
 /// Every cell of the square has the solid angle of its area. Its edges are curved near the poles, so

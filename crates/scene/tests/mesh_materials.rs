@@ -9,6 +9,7 @@ use fenestra_scene::{
     lamp::{LampKind, SpotFalloff},
     material::{Material, MaterialKind, Principled},
     mesh::Mesh,
+    picture::Image,
     texture::{Channels, Encoding, Interpolation, TextureUse, Wrap},
 };
 use glam::Vec3;
@@ -338,6 +339,15 @@ fn specular_glossiness_is_converted_texel_by_texel() {
     assert!(warnings[0].contains("its mean colour counts"), "{warnings:?}");
     let (color, metallic) = (values(&found.surface.color), values(&found.surface.metallic));
     assert!(metallic[1][0] > 0.99 && (color[1][0] - 0.5 * 0.791).abs() < 0.01, "{color:?}");
+    let clamped = r#"{"source": 1, "sampler": 0}], "samplers": [{"wrapS": 33071}]"#;
+    let clamped = rest.replace(r#"{"source": 1}]"#, clamped);
+    let warnings = gltf_material(&folder, &material(""), &clamped).1;
+    assert!(warnings[0].contains("its mean colour counts"), "{warnings:?}");
+    // Half of a gloss of half: a roughness of three quarters.
+    let dull =
+        material(turned).replace("Glossiness\": {", "Glossiness\": {\"glossinessFactor\": 0.5,");
+    let roughness = values(&gltf_material(&folder, &dull, rest).0.surface.roughness);
+    assert!((roughness[1][0] - 0.75).abs() < 0.01, "{roughness:?}");
 }
 
 /// A grey material keeps its diffuse reflectance and its reflectance at normal incidence.
@@ -523,6 +533,24 @@ fn quantized_attributes_are_numbers() {
     assert_eq!(mesh.colors[0], [0.5, 0.25, 0.0, 1.0], "opaque without a fourth number");
 }
 
+/// The last normal ends with the buffer, 12 bytes before a whole stride does.
+#[test]
+fn positions_and_normals_may_lie_by_turns() {
+    let corners = CORNERS.as_chunks::<3>().0;
+    let by_turns: Vec<f32> =
+        corners.iter().flat_map(|&[x, y, z]| [x, y, z, 0.0, 0.6, 0.8]).collect();
+    let attributes = [
+        Attribute::floats("POSITION", "VEC3", &by_turns),
+        Attribute::floats("NORMAL", "VEC3", &[0.0; 9]),
+    ];
+    let text = gltf_of(&attributes, 3, "", "")
+        .replace("\"byteLength\": 72}", "\"byteLength\": 72, \"byteStride\": 24}")
+        .replace("\"bufferView\": 1", "\"bufferView\": 0, \"byteOffset\": 12");
+    let folder = Folder::new();
+    let mesh = Mesh::read(&folder.write("a.gltf", text), &mut Vec::new()).unwrap();
+    assert_eq!((&mesh.positions[..], &mesh.normals[..]), (corners, &[[0.0, 0.6, 0.8]; 3][..]));
+}
+
 #[test]
 fn sparse_accessors_replace_elements_of_a_view_or_of_zeros() {
     let text = gltf(r#"{"mesh": 0}"#, "", "", "");
@@ -555,9 +583,15 @@ fn normals_stand_on_stretched_surfaces() {
 #[test]
 fn morph_targets_move_vertices_by_their_weights() {
     let target = [0.0, 0.0, 2.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0];
-    let attributes = [positions(), Attribute::floats("_TARGET", "VEC3", &target)];
+    let attributes = [
+        positions(),
+        Attribute::floats("_TARGET", "VEC3", &target),
+        Attribute::floats("NORMAL", "VEC3", &[0.0, 1.0, 0.0].repeat(3)),
+        Attribute::floats("TANGENT", "VEC4", &[1.0, 0.0, 0.0, -1.0].repeat(3)),
+    ];
     let text = gltf_of(&attributes, 3, "", "");
-    let text = text.replace("}}]}]", r#"}, "targets": [{"POSITION": 1}]}], "weights": [0.5]}]"#);
+    let targets = r#""targets": [{"POSITION": 1, "NORMAL": 1, "TANGENT": 1}]"#;
+    let text = text.replace("}}]}]", &format!("}}, {targets}}}], \"weights\": [0.5]}}]"));
     let of_node = text.replace(r#"[{"mesh": 0}]"#, r#"[{"mesh": 0, "weights": [0.25]}]"#);
     let folder = Folder::new();
     for (text, weight) in [(text, 0.5), (of_node, 0.25)] {
@@ -565,6 +599,10 @@ fn morph_targets_move_vertices_by_their_weights() {
         let mesh = Mesh::read(&folder.write("a.gltf", text), &mut warnings).unwrap();
         let moved = [[0.0, 0.0, 2.0 * weight], [1.0, 0.0, 4.0 * weight], [0.0, 1.0, 0.0]];
         assert_eq!(mesh.positions, moved);
+        let normal = Vec3::new(0.0, 1.0, 4.0 * weight).normalize();
+        assert!(close(normal, mesh.normals[1]), "{:?}", mesh.normals);
+        let ([x, y, z, sign], along) = (mesh.tangents[1], Vec3::new(1.0, 0.0, 4.0 * weight));
+        assert!(close(along.normalize(), [x, y, z]) && sign == -1.0, "{:?}", mesh.tangents);
         assert!(warnings.is_empty(), "{warnings:?}");
     }
 }
@@ -574,7 +612,8 @@ fn joints_carry_the_vertices_of_a_skin() {
     let shift = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
     let twice = [2.0, 0.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0];
     let joints = vec![0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0];
-    let weights = [1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0];
+    // Those of the second vertex add up to a half: their ratio counts.
+    let weights = [1.0, 0.0, 0.0, 0.0, 0.25, 0.25, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0];
     let attributes = [
         positions(),
         Attribute("JOINTS_0", 5121, "VEC4", false, joints),
@@ -601,6 +640,15 @@ fn joints_carry_the_vertices_of_a_skin() {
     assert!(close(unit(mesh.normals[1]), unit([0.6 / 1.5, 0.8 / 2.5, 0.0]).to_array()));
     let [x, y, z, sign] = mesh.tangents[1];
     assert!(close(unit([x, y, z]), unit([0.8 * 1.5, -0.6 * 2.5, 0.0]).to_array()) && sign == -1.0);
+    assert_eq!(mesh.triangles, [[0, 1, 2]]);
+    // Joints that are not seen carry all the same.
+    let hidden = r#"{"extensions": {"KHR_node_visibility": {"visible": false}}, "translation": [2"#;
+    let hidden = read(text.replace(r#"{"translation": [2"#, hidden)).unwrap();
+    assert_eq!(hidden.positions, mesh.positions);
+    // Joints that mirror turn triangles and bitangents.
+    let mirrored =
+        read(text.replace("\"translation\": [2, 0, 0]", "\"scale\": [-1, 1, 1]")).unwrap();
+    assert_eq!((mirrored.triangles[0], mirrored.tangents[1][3]), ([0, 2, 1], 1.0));
     let found = read(text.replace("[1, 2], \"inverse", "[1], \"inverse")).unwrap_err().to_string();
     assert!(found.contains("vertex 1: joint 1 is out of range, the skin has 1"), "{found}");
 }
@@ -694,6 +742,10 @@ fn lights_of_nodes_become_lamps() {
         (spot.outer_angle_rad.to_degrees(), spot.falloff),
         (45.0, SpotFalloff::SquaredCosine)
     );
+    let limited = text.replace("\"intensity\": 40", "\"intensity\": 40, \"range\": 5");
+    let warnings = Scene::load(&folder.write("b.gltf", limited)).unwrap().warnings;
+    let expected = "ignored range of lights (node `bulb`)";
+    assert!(warnings.iter().any(|text| text.contains(expected)), "{warnings:?}");
     // The lamps are a part of the picture.
     let other = text.replace("\"intensity\": 3", "\"intensity\": 4");
     assert_ne!(Scene::load(&folder.write("b.gltf", other)).unwrap().hash, scene.hash);
@@ -744,6 +796,9 @@ fn what_the_format_leaves_open_is_completed() {
     // Without scenes all nodes stand.
     let without = whole.replace(&format!("{one}, "), "");
     assert!(!without.contains("scenes") && triangle(&load(&without)));
+    let parent = r#"{"children": [1], "translation": [5, 0, 0]}, {"mesh": 0}"#;
+    let child = load(&gltf(parent, "", "", "").replace(&format!("{one}, "), ""));
+    assert!(triangle(&child) && child.geometry.positions.iter().all(|point| point[0] >= 5.0));
     let without = whole.replace(r#""min": [0, 0, 0], "max": [1, 1, 0]"#, r#""name": "corners""#);
     assert!(!without.contains("min") && triangle(&load(&without)));
     let zeros = whole.replace(
@@ -752,8 +807,9 @@ fn what_the_format_leaves_open_is_completed() {
     );
     let zeros = zeros.replace(r#""POSITION": 0"#, r#""POSITION": 0, "NORMAL": 1"#);
     assert_eq!(load(&zeros).geometry.normals, [[0.0; 3]; 3]);
-    let hidden = r#"{"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": false}}}"#;
-    let hidden = gltf(&format!(r#"{{"mesh": 0}}, {hidden}"#), "", "", "");
+    let hidden = r#"{"mesh": 0}, {"mesh": 0, "children": [2], "extensions":
+        {"KHR_node_visibility": {"visible": false}}}, {"mesh": 0}"#;
+    let hidden = gltf(hidden, "", "", "");
     let hidden = load(&hidden.replace(one, r#""scenes": [{"nodes": [0, 1]}]"#));
     assert!(triangle(&hidden));
     assert!(hidden.warnings.iter().all(|text| !text.contains("ignored")), "{:?}", hidden.warnings);
@@ -761,6 +817,8 @@ fn what_the_format_leaves_open_is_completed() {
         "KHR_materials_sheen": {"sheenColorFactor": [0, 0, 0]}, "KHR_materials_dispersion": {}}}"#;
     let (_, warnings) = gltf_material(&folder, idle, "");
     assert!(warnings.iter().all(|text| !text.contains("ignored")), "{warnings:?}");
+    let (_, warnings) = gltf_material(&folder, &idle.replace("[0, 0, 0]", "[0.5, 0, 0]"), "");
+    assert!(warnings[0].contains("KHR_materials_sheen"), "{warnings:?}");
 }
 
 #[test]
@@ -895,6 +953,9 @@ fn mtl_materials_become_surfaces() {
     assert_eq!(mtl_material(&folder, "d 0\nTr 1").0.surface.opacity.factor, 0.0);
     assert_eq!((texture.scale, texture.bias), ([0.5; 3], [0.2; 3]));
 
+    // Exporters that write both mean `d`.
+    assert_eq!(mtl_material(&folder, "Tr 0.5\nd 0.75").0.surface.opacity.factor, 0.75);
+
     let kind = |keys: &str| mtl_material(&folder, keys).0.kind;
     let pane = kind("Kd 0.5 1 1\nKs 1 1 1\nd 0.2\nNi 1.4\nillum 7");
     let MaterialKind::ThinDielectric { ior, transmittance, .. } = pane else { panic!("{pane:?}") };
@@ -925,6 +986,23 @@ fn mtl_materials_become_surfaces() {
     assert_eq!(found.surface.metallic.unwrap().encoding, Encoding::Linear);
     let emission = found.surface.emission.unwrap();
     assert_eq!((emission.radiance, emission.two_sided), (Vec3::new(2.0, 1.0, 0.0), true));
+    let emission = mtl_material(&folder, "map_Ke grey.png").0.surface.emission.unwrap();
+    assert_eq!(
+        (emission.radiance, emission.texture.unwrap().encoding),
+        (Vec3::ONE, Encoding::Srgb)
+    );
+}
+
+#[test]
+fn opacities_above_one_are_one() {
+    let folder = Folder::new();
+    let mut image = Image::of_rgb(2, 1, &[[9.0; 3]; 2]);
+    image.channels.insert("A".to_owned(), vec![0.5, 2.0]);
+    image.write_exr(&folder.path().join("a.exr")).unwrap();
+    let (found, warnings) = mtl_material(&folder, "map_Kd a.exr");
+    let values = found.surface.color.unwrap().values();
+    assert_eq!(values, [[9.0, 9.0, 9.0, 0.5], [9.0, 9.0, 9.0, 1.0]]);
+    assert!(warnings[0].contains("1 values are above 65504, or opacities above 1"), "{warnings:?}");
 }
 
 #[test]
@@ -1055,17 +1133,18 @@ fn ply_coordinates_and_colours_are_read() {
         let text = format!(
             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
              property float z\nproperty float {v}\nproperty float {u}\nproperty uchar red\n\
-             property ushort green\nproperty uchar blue\nelement face 1\n\
+             property ushort green\nproperty uchar blue\nproperty uchar alpha\nelement face 1\n\
              property list uchar int vertex_indices\nend_header\n\
-             0 0 0 0.1 0.2 255 48316 188\n1 0 0 0.3 0.4 0 0 0\n0 1 0 0.5 0.6 0 0 0\n3 0 1 2\n"
+             0 0 0 0.1 0.2 255 48316 188 51\n1 0 0 0.3 0.4 0 0 0 0\n0 1 0 0.5 0.6 0 0 0 0\n\
+             3 0 1 2\n"
         );
         let mut warnings = Vec::new();
         let mesh = Mesh::read(&folder.write("a.ply", text), &mut warnings).unwrap();
         assert_eq!(mesh.uvs[0], [[0.2, 0.1], [0.4, 0.3], [0.6, 0.5]]);
         assert_eq!(warnings, [""; 0]);
         let [r, g, b, a] = mesh.colors[0];
-        // 48316 of 65535 is 188 of 255.
-        assert!((r, g, a) == (1.0, b, 1.0) && (b - 0.5029).abs() < 1e-3, "{g} {b}");
+        // 48316 of 65535 is 188 of 255. Opacity is linear.
+        assert!((r, g, a) == (1.0, b, 0.2) && (b - 0.5029).abs() < 1e-3, "{g} {b}");
     }
     let unknown = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
         property float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n\

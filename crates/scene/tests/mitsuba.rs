@@ -179,6 +179,11 @@ fn cameras_look_along_z_and_stand_upright() {
     assert_eq!(scene.film.filter, Filter::Gaussian);
     assert_eq!(scene.warnings, [""; 0]);
     assert_eq!(scene.environment.texels[0], Vec3::ZERO, "no light but that of the file");
+    for axis in ["x", "y"] {
+        let offset = format!("<float name=\"principal_point_offset_{axis}\" value=\"-0.1\"/>");
+        let warnings = self::camera(&offset, "").warnings;
+        assert!(warnings[0].contains("ignored `principal_point_offset_x`, "), "{warnings:?}");
+    }
     let mirrored = self::camera(
         r#"<transform name="to_world"><scale x="-1"/></transform>"#,
         r#"<rfilter type="tent"/>"#,
@@ -226,6 +231,10 @@ fn sensors_are_chosen_by_id_or_number() {
         assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
         assert!(scene.warnings[0].contains("sensors that are not used (line 2)"));
     }
+    // A lens without a focus has it where the view ends.
+    let far = thin.replace("focus_distance\" value=\"3", "far_clip\" value=\"50");
+    let scene = loaded(&folder.write("b.xml", document(&far)));
+    assert_eq!(scene.camera.focus_distance, 50.0);
     let message = with("far").unwrap_err().to_string();
     assert!(message.contains("--camera far") && message.contains("0, `close`"), "{message}");
 }
@@ -301,6 +310,15 @@ fn models_become_materials() {
     };
     assert_eq!(eta, Vec3::new(0.052, 0.489, 0.602));
     assert_eq!(k, Vec3::new(1.414, 1.3125, 1.1785));
+    let (wet, _) = material(
+        r#"<bsdf type="conductor"><string name="material" value="Cu"/>
+        <string name="ext_eta" value="water"/></bsdf>"#,
+    );
+    let MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { eta, .. }, .. } = wet.kind
+    else {
+        panic!()
+    };
+    assert_close(1.333 * eta, Vec3::new(0.104, 0.978, 1.204));
     assert_eq!(warnings.len(), 2, "Beckmann and two widths: {warnings:?}");
     let (dull, _) = material(
         r#"<bsdf type="conductor"><rgb name="eta" value="1"/><rgb name="k" value="2"/>
@@ -502,6 +520,12 @@ fn heights_become_normals_along_their_image() {
             assert!(found.abs_diff_eq(expected, 2e-3), "{times}: {found} {expected}");
         }
     }
+    // Where two rows repeat, each has the other on both sides, and no slope.
+    let scene = of(bumps(&image("any").replace("wrap_mode", "wrap_mode_u"), diffuse));
+    let normal = scene.materials[0].surface.normal.as_ref().unwrap();
+    let found = 2.0 * normal.value(Vec2::splat(0.25)).truncate() - 1.0;
+    let expected = Vec3::new(red - green, 0.0, 1.0).normalize();
+    assert!(found.abs_diff_eq(expected, 2e-3), "{found} {expected}");
     // One of two maps counts; a constant height is none.
     let normals = format!("<bsdf type=\"normalmap\">{}{diffuse}</bsdf>", image("normalmap"));
     let both = of(bumps(&image("any"), &normals));
@@ -581,6 +605,8 @@ fn spectra_become_the_colours_of_mitsuba() {
     assert_eq!(intensity(r#"<float name="intensity" value="2"/>"#), Vec3::splat(2.0));
     let warm = intensity(r#"<blackbody name="intensity" temperature="3000K"/>"#);
     assert!(warm.x > 1.5 * warm.y && warm.y > 2.0 * warm.z, "{warm}");
+    let twice = r#"<blackbody name="intensity" temperature="3000" scale="2"/>"#;
+    assert_close(intensity(twice), 2.0 * warm);
     let of_type = |kind: &str, rest: &str| {
         intensity(&format!("<spectrum name=\"intensity\" type=\"{kind}\">{rest}</spectrum>"))
     };

@@ -319,6 +319,9 @@ fn materials_are_the_nearest() {
     close(eta, [1.6, 0.8, 0.5]);
     close(k, [4.049, 3.343, 2.393]);
     assert_eq!(alpha, 1e-3);
+    // The metal below a coat has a roughness of its own.
+    let coated = r#""coatedconductor" "float conductor.roughness" 0.25"#;
+    assert!(matches!(material(coated).kind, MaterialKind::Conductor { alpha: 0.5, .. }));
     // η = 1 and k = 2√r/√(1 − r) reflect r at normal incidence.
     let MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { eta, k }, .. } =
         material(r#""conductor" "rgb reflectance" [0.5 1 0]"#).kind
@@ -350,7 +353,11 @@ fn materials_are_the_nearest() {
     let absorption = |index: usize| clear.materials[index].kind.absorption();
     assert_eq!([absorption(0), absorption(1)], [Some(Vec3::new(2.0, 0.5, 1.0)), None]);
     assert_eq!(warnings(&clear), [DARK]);
-    for medium in ["", r#""rgb sigma_s" [0 0 0] "string preset" "Milk""#] {
+    for medium in [
+        "",
+        r#""rgb sigma_s" [0 0 0] "string preset" "Milk""#,
+        r#""rgb sigma_s" [0 0 0] "rgb Le" [1 1 1]"#,
+    ] {
         let scattering = filled(medium);
         assert_eq!(scattering.materials[0].kind.absorption(), None);
         assert!(warnings(&scattering)[0].contains("ignored other media"), "{medium}");
@@ -611,6 +618,18 @@ fn lamps_have_their_places_and_powers() {
         let power = sides * radiance * PI.powi(2);
         assert!((power - 3.0).abs() < 0.01, "{radiance}");
     }
+}
+
+#[test]
+fn lights_of_one_material_keep_their_sides() {
+    let light =
+        |sides| format!("AreaLightSource \"diffuse\" \"bool twosided\" {sides} {TRIANGLE}\n");
+    let scene = world(&["true", "false", "true"].map(light).concat());
+    let sides = scene.geometry.materials.iter().map(|&material| {
+        scene.materials[material as usize].surface.emission.as_ref().unwrap().two_sided
+    });
+    assert_eq!(sides.collect::<Vec<_>>(), [true, false, true]);
+    assert_eq!(scene.materials.len(), 2);
 }
 
 #[test]
@@ -1019,6 +1038,8 @@ fn files_of_others_mean_what_pbrt_takes_them_for() {
     let head = r#"Sampler "stratified" "integer xsamples" 4 "integer ysamples" 2"#;
     let asked = load(head, TRIANGLE).asked;
     assert_eq!((asked.samples, asked.depth), (Some(8), Some(5)));
+    let none = r#"Sampler "independent" "integer pixelsamples" 0"#;
+    assert_eq!(load(none, TRIANGLE).asked.samples, None);
     let integrator = r#"Integrator "path" "bool regularize" true "integer maxdepth" 3"#;
     let regularized = load(&format!("{integrator} {MIRRORED}"), "");
     assert_eq!(regularized.asked.depth, Some(3));

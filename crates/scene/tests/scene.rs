@@ -10,10 +10,10 @@ use std::{
 
 use fenestra_scene::{
     Error, Scene, export,
-    lamp::{LampKind, SpotFalloff},
+    lamp::{LampKind, Spot, SpotFalloff},
     light_group::LightGroups,
     load::{LoadOptions, arrays::Arrays},
-    material::{ConductorFresnel, MaterialKind, Principled},
+    material::{ConductorFresnel, Emission, MaterialKind, Principled, Surface},
     mesh::Mesh,
     picture::{Image, RgbImage},
     still_hash,
@@ -24,7 +24,7 @@ use glam::Vec3;
 use crate::support::{
     assert_contains,
     folder::Folder,
-    gltf::{base64, floats, png},
+    gltf::{base64, floats, gltf, png},
     seeds::glb,
 };
 
@@ -587,6 +587,20 @@ fn textures_are_placed_by_offset_turn_and_repetitions() {
 }
 
 #[test]
+fn an_image_that_is_named_in_two_ways_is_one_texture() {
+    let folder = Folder::new();
+    folder.write("wood.png", png(TEXELS));
+    folder.write("parts/oak.txt", "a folder to go through");
+    let text = HEAD.replace("[0.5, 0.5, 0.5]", "{ texture = \"wood.png\" }")
+        + "[[material]]\nname = \"oak\"\ntype = \"mirror\"\n\
+           reflectance = { texture = \"parts/../wood.png\" }\n";
+    let scene = load(&folder, &text).unwrap();
+    let image = |at: usize| &scene.materials[at].surface.color.as_ref().unwrap().texture;
+    assert!(Arc::ptr_eq(image(0), image(1)));
+    assert_eq!(scene.inputs.len(), 2, "{:?}", scene.inputs);
+}
+
+#[test]
 fn what_textures_cannot_do_is_refused_by_name() {
     let folder = Folder::new();
     folder.write("wood.png", png(TEXELS));
@@ -727,6 +741,17 @@ fn lamps_take_every_form_and_a_scene_needs_no_environment() {
     case("irradiance", "intensity", "unknown key `intensity` in lamp of type `directional`");
     let emission = dark.replace("\"diffuse\"", "\"diffuse\"\nemission = [1, 1, 1]");
     assert!(load(&folder, &emission).unwrap().warnings.is_empty());
+}
+
+/// The second edge leans by less than a twentieth of a degree.
+#[test]
+fn portals_are_rectangles_along_their_first_edges() {
+    let edges = "first_edge = [2, 0, 0]\nsecond_edge = [0.003, 4, 0]";
+    let text = with_box(&format!("[[portal]]\ncorner = [1, 2, 3]\n{edges}"));
+    let portal = load(&Folder::new(), &text).unwrap().portals.remove(0);
+    assert_eq!((portal.corner, portal.axes[0]), (Vec3::new(1.0, 2.0, 3.0), Vec3::X));
+    assert!(portal.axes[1].abs_diff_eq(Vec3::Y, 1e-6), "{}", portal.axes[1]);
+    assert!(portal.size[0] == 2.0 && (portal.size[1] - 4.0).abs() < 1e-5, "{:?}", portal.size);
 }
 
 #[test]
@@ -879,6 +904,11 @@ fn scenes_of_other_programs_are_included_with_their_lamps() {
     let ignored = "include lamp.pbrt (line";
     let named = |text: &String| text.contains(ignored) && text.contains("environment");
     assert!(scene.warnings.iter().any(named), "{:?}", scene.warnings);
+    // Lamps of included files come after those of the scene.
+    let bulb = "[[lamp]]\nname = \"bulb\"\ntype = \"point\"\nposition = [1, 2, 3]\n\
+                intensity = [4, 5, 6]\n";
+    let lamps = load(&folder, &format!("{text}{bulb}")).unwrap().lamps;
+    assert_eq!((lamps.len(), lamps[0].name.as_str()), (2, "bulb"));
 }
 
 #[test]
@@ -956,6 +986,8 @@ fn a_room_is_seen_from_inside_and_a_box_is_not() {
     assert!(from.cmpgt(low).all() && from.cmplt(high).all(), "{from}");
     let along = (at - from).normalize();
     assert!(along.x.abs() > 0.9 && (at - from).length() > 4.0, "{from} {at}");
+    // The middle of the view lies lower than the eyes, by 0.06 of its length.
+    assert!((along.y / along.with_y(0.0).length() + 0.06).abs() < 1e-3, "{along}");
     assert!(!seen(false, 1).0);
     assert!(!seen(true, 4).0, "shelves");
 }
@@ -981,6 +1013,9 @@ fn the_hash_follows_the_picture_and_not_the_text() {
         ("[0, 1, 5]", "[0, 1, 5.001]"),
         ("= 40", "= 41"),
         ("= 40", "= 40\nup = [0.1, 1, 0]"),
+        // The point looked at is 5 m away, and in focus without this.
+        ("= 40", "= 40\naperture_radius = 0.1\nfocus_distance = 5"),
+        ("= 40", "= 40\nfocus_distance = 4"),
         ("constant = [1, 1, 1]", "constant = [1, 1, 1.001]"),
         ("0.5, 0.5, 0.5", "0.5, 0.5, 0.501"),
         ("type = \"diffuse\"\nreflectance", "type = \"conductor\"\nalpha = 0.5\nreflectance"),
@@ -1005,6 +1040,47 @@ fn the_hash_follows_the_picture_and_not_the_text() {
         hash(&with_box(&format!("[[lamp]]\ntype = \"point\"\n{keys}")))
     };
     assert_ne!(lamp(1), lamp(2));
+}
+
+#[test]
+fn the_hash_follows_every_part_of_surfaces_and_lights() {
+    let spot = "[[lamp]]\ntype = \"spot\"\nposition = [0, 3, 0]\ndirection = [0, -1, 0]\n\
+                intensity = [1, 1, 1]";
+    let original = load(&Folder::new(), &with_box(spot)).unwrap();
+    fn surface(scene: &mut Scene) -> &mut Surface {
+        &mut scene.materials[0].surface
+    }
+    fn lit(scene: &mut Scene, two_sided: bool) {
+        let emission = Emission { radiance: Vec3::ONE, texture: None, two_sided };
+        surface(scene).emission = Some(emission);
+    }
+    fn beam(scene: &mut Scene) -> &mut Spot {
+        let LampKind::Spot(spot) = &mut scene.lamps[0].kind else { panic!("a spot") };
+        spot
+    }
+    let changes: [fn(&mut Scene); 15] = [
+        |_| (),
+        |scene| scene.environment.rotation_rad = 1.0,
+        |scene| lit(scene, false),
+        |scene| lit(scene, true),
+        |scene| surface(scene).opacity.factor = 0.5,
+        |scene| surface(scene).opacity.cutoff = Some(0.5),
+        |scene| surface(scene).normal_scale = 0.5,
+        |scene| surface(scene).vertex_color = true,
+        |scene| surface(scene).two_sided = false,
+        |scene| beam(scene).position.x = 1.0,
+        |scene| beam(scene).direction = Vec3::NEG_Z,
+        |scene| beam(scene).intensity.y = 2.0,
+        |scene| beam(scene).inner_angle_rad = 0.1,
+        |scene| beam(scene).outer_angle_rad = 1.0,
+        |scene| beam(scene).falloff = SpotFalloff::LinearAngle,
+    ];
+    let hashes = changes.map(|change| {
+        let mut scene = original.clone();
+        change(&mut scene);
+        still_hash(&scene)
+    });
+    assert_eq!(hashes.iter().collect::<HashSet<_>>().len(), changes.len(), "{hashes:#?}");
 }
 
 #[test]
@@ -1247,6 +1323,23 @@ fn obj_reads_groups_polygons_normals_and_colors() {
     assert!(message.contains("object `o` (shapes.obj, line 14): expected a material"), "{message}");
 }
 
+/// Corners that share a point are many vertices, each with its own normal.
+#[test]
+fn a_point_of_an_obj_file_may_have_many_normals() {
+    let folder = Folder::new();
+    let (mut text, count) = ("v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_owned(), 40);
+    for normal in 1..=count {
+        text += &format!("vn {normal} 0 1\nf 1//{normal} 2//{normal} 3//{normal}\n");
+    }
+    // They are found again.
+    text += &format!("f 1//1 2//{count} 3//{count}\n");
+    let mesh = read(&folder, "fan.obj", text);
+    assert_eq!((mesh.positions.len(), mesh.triangles.len()), (3 * count, count + 1));
+    for (triangle, normal) in mesh.triangles.iter().zip(1..=count) {
+        assert_eq!(triangle.map(|at| mesh.normals[at as usize]), [[normal as f32, 0.0, 1.0]; 3]);
+    }
+}
+
 #[test]
 fn broken_obj_files_are_refused_with_their_line() {
     let folder = Folder::new();
@@ -1265,6 +1358,7 @@ fn broken_obj_files_are_refused_with_their_line() {
     case("f 1 2 3", "f 1 2 x", "expected the index of a position, found `x`");
     case("f 1 2 3", "f 1 2 99999999999999999999", "expected the index of a position");
     case("v 1 0 0", "v 1 zero 0", "broken.obj:2:1: expected three numbers, found `zero`");
+    case("v 1 0 0", "v 1 \\\n zero 0", "broken.obj:2:1: expected three numbers, found `zero`");
     case("v 1 0 0", "v 1 0", "broken.obj:2:1: expected three numbers, found ``");
     let mut warnings = Vec::new();
     let path = folder.write("lost.obj", format!("mtllib lost.mtl\n{good}"));
@@ -1336,6 +1430,22 @@ fn gltf_reads_nodes_from_every_kind_of_buffer() {
         warnings.iter().any(|line| line.contains("further scenes (scene `night`)")),
         "{warnings:?}"
     );
+}
+
+#[test]
+fn the_first_gltf_camera_with_perspective_gives_view_and_film() {
+    let nodes =
+        r#"{"mesh": 0, "children": [1, 2, 3]}, {"camera": 0}, {"camera": 1}, {"camera": 2}"#;
+    let rest = r#", "cameras": [{"type": "orthographic", "name": "flat",
+        "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1}},
+        {"type": "perspective", "perspective": {"yfov": 0.5, "aspectRatio": 2, "znear": 0.1}},
+        {"type": "perspective", "name": "far", "perspective": {"yfov": 1, "znear": 0.1}}]"#;
+    let folder = Folder::new();
+    let scene = Scene::load(&folder.write("a.gltf", gltf(nodes, "", "", rest))).unwrap();
+    assert!((scene.camera.vertical_fov_deg.to_radians() - 0.5).abs() < 1e-6, "{:?}", scene.camera);
+    assert_eq!((scene.film.width, scene.film.height), (640, 320));
+    let left_out = ["orthographic cameras (`flat`)", "cameras that are not used (`far`)"];
+    assert_contains(&scene.warnings.concat(), &left_out);
 }
 
 #[test]

@@ -366,6 +366,11 @@ fn grids_are_sheets_of_their_thickness() {
         let top = mesh.normals.iter().filter(|normal| normal[1] > 0.1);
         let steepest = top.map(|normal| normal[axis]).fold(0.0, f32::max);
         assert!((steepest - (0.4 * PI as f32).atan().sin()).abs() < 1e-2, "{axis}: {steepest}");
+        // Heights rise along the direction where the phase is 0.
+        let is_middle = |at: &[f32; 3]| at[axis].abs() < 3e-3;
+        let mut vertices = mesh.positions.iter().zip(&mesh.normals);
+        let (_, normal) = vertices.find(|(at, n)| is_middle(at) && n[1] > 0.1).unwrap();
+        assert!(normal[axis] < -0.7, "{axis}: {normal:?}");
     }
     let hill = "size = [1.0, 1.0]\nthickness = 0.002\nheights = [[0,0,0],[0,0.3,0],[0,0,0]]";
     let mesh = shape("grid", hill).unwrap();
@@ -373,6 +378,11 @@ fn grids_are_sheets_of_their_thickness() {
     let middle =
         mesh.positions.iter().find(|p| p[0].abs() < 1e-6 && p[2].abs() < 1e-6 && p[1] > 0.3);
     assert!((middle.unwrap()[1] - 0.301).abs() < 1e-5);
+    // Rows run from −z to +z, each from −x to +x.
+    let corner = "size = [1.0, 1.0]\ncells = [1, 1]\nheights = [[0, 0.3], [0, 0]]";
+    let mesh = shape("grid", corner).unwrap();
+    let highest = mesh.positions.iter().max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
+    assert!(highest[0] > 0.49 && highest[2] < -0.49, "{highest:?}");
 }
 
 #[test]

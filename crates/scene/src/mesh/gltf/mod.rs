@@ -177,25 +177,26 @@ impl GltfReader<'_> {
             }
         }
         // Use a stack, not recursion: nodes may nest deeper than the call stack.
-        let mut stack: Vec<(Node, Mat4)> =
-            roots.into_iter().map(|node| (node, Mat4::IDENTITY)).collect();
+        let mut stack: Vec<(Node, Mat4, bool)> =
+            roots.into_iter().map(|node| (node, Mat4::IDENTITY, true)).collect();
         stack.reverse();
-        while let Some((node, world_from_parent)) = stack.pop() {
+        while let Some((node, world_from_parent, is_shown)) = stack.pop() {
             if worlds[node.index()].is_some() {
                 let message = format!("node {} has more than one parent", node.index());
                 return Err(self.error(message));
             }
             let visibility = &self.json["nodes"][node.index()]["extensions"]["KHR_node_visibility"];
-            if visibility["visible"] == false {
-                continue;
-            }
+            let is_shown = is_shown && visibility["visible"] != false;
             let stands = || Mat4::from_cols_array_2d(&node.transform().matrix());
             let parent_from_node = poses.get(&node.index()).copied().unwrap_or_else(stands);
             let world_from_node = world_from_parent * parent_from_node;
             worlds[node.index()] = Some(world_from_node);
+            stack.extend(node.children().map(|child| (child, world_from_node, is_shown)));
+            if !is_shown {
+                continue;
+            }
             self.read_node(&node, world_from_node);
             self.read_lamp(&node, world_from_node)?;
-            stack.extend(node.children().map(|child| (child, world_from_node)));
             if let Some(mesh) = node.mesh() {
                 if !std::mem::replace(&mut seen_meshes[mesh.index()], true) {
                     self.ignore_in_mesh(&mesh);

@@ -248,7 +248,9 @@ impl Source<'_> {
         }
         for property in &element.properties {
             let is_color = COLOR_NAMES.iter().flatten().any(|name| *name == property.name);
-            if is_color || property.name == "texnumber" {
+            // Corners can have coordinates of their own where the vertices are known.
+            let is_lost = property.name == "texcoord" && mesh.positions.is_empty();
+            if is_color || is_lost || property.name == "texnumber" {
                 let name = format!("`{}` of {}s", property.name, element.name);
                 self.ignored.add_named(features::PLY_FACE, &name, || "the header".to_owned());
             }
