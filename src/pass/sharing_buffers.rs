@@ -27,8 +27,8 @@ pub(crate) fn sharing_demand(demand: PathDemand, cohort_pixels: u32) -> PathDema
     }
 }
 
-/// Allocates descriptor set 1 of the passes of sharing: first and second vertices of one wave of up to `paths`
-/// paths, and the connections between them in cohorts of `cohort_pixels`. Fails if the device does.
+/// Allocates descriptor set 1 of the passes of sharing: first and second vertices of one wave of up to
+/// `paths` paths, and the connections between them in cohorts of `cohort_pixels`. Fails if the device does.
 pub(crate) fn sharing_set(
     device: &Arc<Device>,
     paths: u32,

@@ -227,8 +227,8 @@ impl<'a> Loader<'a> {
             let step = farthest * f32::EPSILON;
             if size < LEAST_STEPS * step {
                 scene.warnings.push(format!(
-                    "{}: coordinates of {farthest:e} have steps of {step:e} in a scene of {size:e}: move it to \
-                     the origin",
+                    "{}: coordinates of {farthest:e} have steps of {step:e} in a scene of {size:e}: move it \
+                     to the origin",
                     self.path.display()
                 ));
             }

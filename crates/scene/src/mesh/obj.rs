@@ -77,15 +77,20 @@ fn for_each_line(
         let ended = bytes.trim_ascii_end();
         for part in ended.split(|byte| *byte == b'\r') {
             line += 1;
-            statement.extend_from_slice(part);
-            match statement.last_mut() {
-                Some(last) if *last == b'\\' && !part.starts_with(b"#") => *last = b' ',
-                _ => {
+            match part.strip_suffix(b"\\").filter(|_| !part.starts_with(b"#")) {
+                Some(part) => {
+                    statement.extend_from_slice(part);
+                    statement.push(b' ');
+                    continue;
+                }
+                None if statement.is_empty() => use_line(line, &files::decoded(part))?,
+                None => {
+                    statement.extend_from_slice(part);
                     use_line(first_line, &files::decoded(&statement))?;
                     statement.clear();
-                    first_line = line + 1;
                 }
             }
+            first_line = line + 1;
         }
     }
 }

@@ -21,9 +21,9 @@ pub(super) fn statement(text: &str) -> (&str, &str) {
     if keyword.starts_with('#') {
         return ("", "");
     }
-    let key = keyword.to_ascii_lowercase();
-    let has_name = matches!(&*key, "o" | "g" | "usemtl" | "mtllib" | "newmtl" | "bump" | "norm")
-        || key.starts_with("map_");
+    let is = |name: &&str| keyword.eq_ignore_ascii_case(name);
+    let has_name = ["o", "g", "usemtl", "mtllib", "newmtl", "bump", "norm"].iter().any(is)
+        || keyword.get(..4).is_some_and(|start| start.eq_ignore_ascii_case("map_"));
     let comment = match rest.strip_suffix(" #") {
         Some(name) if has_name => Some(name.len()),
         _ if has_name => rest.find(" # "),
