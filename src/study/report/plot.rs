@@ -187,7 +187,7 @@ fn mark(frame: &Frame, series: &Series, point: &Point) -> String {
 }
 
 /// Draws lines with bands on two logarithmic axes, and a faint line of the given slope, at most 0. `titles`
-/// are those of the plot, of x and of y.
+/// are those of the plot, of the abscissa and of the ordinate.
 pub(crate) fn log_log(titles: [&str; 3], series: &[Series], slope: f64) -> String {
     let all = || series.iter().flat_map(|series| &series.points);
     let frame = Frame {
