@@ -1356,7 +1356,8 @@ fn a_file_asks_for_samples_and_depth() {
     let asked = |integrator: &str| load(integrator).asked.depth;
     assert_eq!(asked(r#"<integrator type="direct"/>"#), Some(1));
     let endless = r#"<integrator type="path"><integer name="max_depth" value="-1"/></integrator>"#;
-    assert_eq!((asked(endless), asked("")), (Some(64), None));
+    let unstated = asked(r#"<integrator type="path"/>"#);
+    assert_eq!((asked(endless), unstated, asked("")), (Some(64), Some(64), None));
 }
 
 /// Radiances of Mitsuba 3.9.1 from the direction of the sun's place at a date.

@@ -100,8 +100,7 @@ impl Reader {
             | "prbvolpath" | "prb_basic" | "path_guided" => {
                 // Mitsuba counts the edges of a path, the one to the light included.
                 self.asked.depth = match parameters.integer("max_depth")? {
-                    None => self.asked.depth,
-                    Some(-1) => Some(Asked::MAX_DEPTH),
+                    None | Some(-1) => Some(Asked::MAX_DEPTH),
                     Some(edges) => Some((edges - 1).clamp(1, i64::from(Asked::MAX_DEPTH)) as u32),
                 };
                 let roulette = parameters.integer("rr_depth")?;
