@@ -163,6 +163,15 @@ fn a_heatmap_is_written_into_a_new_folder() {
     folder.run(&["compare", "b.exr", "a.exr", "--heatmap", "new/folder/heat.png"]).assert(0, &[]);
     let png = fs::read(folder.path().join("new/folder/heat.png")).unwrap();
     assert_eq!(&png[..4], b"\x89PNG");
+    // Where one half of the reference is met, (x − r₁)(x − r₂) is no error, whatever the other says.
+    let map = |name: &str, arguments: &[&str]| {
+        let scale = ["--heatmap", name, "--heatmap-high", "1"];
+        folder.run(&[&["compare", "b.exr"], arguments, &scale].concat()).assert(0, &[]);
+        fs::read(folder.path().join(name)).unwrap()
+    };
+    let met = map("met.png", &["a.exr", "--second-reference", "b.exr"]);
+    assert_eq!(met, map("none.png", &["b.exr"]));
+    assert_ne!(met, map("some.png", &["a.exr"]));
 }
 
 #[test]

@@ -244,7 +244,7 @@ fn a_render_keeps_its_film() {
         Run::of(&program.env(VARIABLE, &library).output().unwrap())
     };
     render(&["-o", "plain.exr"]).assert(0, &[]);
-    let result = render(&["-o", "film.exr", "--denoise", "--png"]);
+    let result = render(&["-o", "film.exr", "--denoise", "--png", "--exposure=-2"]);
     result.assert(0, &["biased", "wrote film.exr, film.png, film.denoised.exr, film.denoised.png"]);
     let [plain, film, denoised] =
         ["plain.exr", "film.exr", "film.denoised.exr"].map(|name| folder.image(name));
@@ -257,7 +257,14 @@ fn a_render_keeps_its_film() {
     assert_eq!(denoised.attributes["samplesPerPixel"], Attribute::Integer(2));
     assert!(moments(&denoised).1 < moments(&film).1);
     let [shown, clean] = ["film.png", "film.denoised.png"].map(|name| folder.path().join(name));
-    assert_ne!(fs::read(shown).unwrap(), fs::read(clean).unwrap());
+    let [shown, clean] = [shown, clean].map(|path| fs::read(path).unwrap());
+    assert_ne!(shown, clean);
+    // Both previews have the exposure asked for.
+    for (picture, preview) in [("film.exr", shown), ("film.denoised.exr", clean)] {
+        let options = ["convert", picture, "again.png", "--exposure=-2"];
+        folder.run(&options).assert(0, &[]);
+        assert!(fs::read(folder.path().join("again.png")).unwrap() == preview, "{picture}");
+    }
 }
 
 #[test]

@@ -289,6 +289,34 @@ fn a_run_by_error_tells_how_far_it_is() {
     assert!(matches!(standing.limit, Some(Limit::Error(_))));
 }
 
+/// A checkpoint holds half of the samples, which took no time of this run.
+#[test]
+fn a_resumed_run_tells_how_far_it_is() {
+    let _alone = support::alone();
+    let folder = Folder::new();
+    let path = folder.path().join("room.checkpoint.exr");
+    let session = |throughput| {
+        let roulette = Roulette { vertex: 1, throughput };
+        let settings = Settings { roulette, ..settings(Sampler::Mis) };
+        Session::new(support::device(), &scene(), settings).unwrap()
+    };
+    let mut first = session(0.5);
+    first.renderer.render_pass(32).unwrap();
+    let sums = first.sums().unwrap();
+    first.write_checkpoint(&path, sums).unwrap().unwrap();
+    let differs = "sampler parameter roulette-throughput: 0.5 against 0.25";
+    assert_error(session(0.25).resume(&path), &[differs]);
+    let mut again = session(0.5);
+    again.resume(&path).unwrap();
+    let rules = Rules { samples: Some(64), seconds: Some(1e9), ..Rules::default() };
+    let standing = again.standing(&rules);
+    assert_eq!((standing.fraction, standing.limit), (0.5, Some(Limit::Samples(64))));
+    // Its first sample alone tells the rate of the 31 others.
+    let took = again.pass(1, 1.0).unwrap();
+    let left = again.standing(&rules).seconds_left.unwrap();
+    assert!((left / (31.0 * took) - 1.0).abs() < 1e-9, "{left} s left, {took} s a sample");
+}
+
 /// In a room with lamps, panes, mirrors and sheets, and with roulette, so that paths end for every reason.
 #[test]
 fn lists_of_living_paths_make_no_difference() {

@@ -300,6 +300,9 @@ fn sums_that_are_not_finite_are_counted() {
     sums.squares[1][0] = f32::INFINITY;
     sums.squares[3][0] = f32::INFINITY;
     assert_eq!(sums.non_finite_count(), 2);
+    sums.pending = vec![[0.0; 3]; sums.pixel_count()];
+    sums.pending[0][1] = f32::INFINITY;
+    assert_eq!(sums.non_finite_count(), 3, "a sample of a stopped sweep counts as well");
 }
 
 #[test]
@@ -442,6 +445,10 @@ fn a_checkpoint_of_another_render_is_refused_with_every_difference() {
         let part = format!("layer {layer}: absent against asked for");
         assert_error(bare.check_resume(path, &expected, &checkpoint.sums), &[&part]);
     }
+    let mut grouped = checkpoint.sums.clone();
+    grouped.groups.push(GroupSums { name: "key".to_owned(), ..GroupSums::default() });
+    let resumed = checkpoint.check_resume(path, &expected, &grouped);
+    assert_error(resumed, &["layer light-groups: absent against asked for"]);
 }
 
 /// Returns one accumulation of 30 samples, and the same samples in parts of 10 and 20.
@@ -502,6 +509,14 @@ fn merged_checkpoints_equal_one_run() {
     second.metadata.candidates = Some(1);
     let mixed = merge_checkpoints(&[(a, &first), (b, &second)]).unwrap();
     assert_eq!(mixed.metadata.candidates, None);
+    // Half the samples are no layer of a group of lights.
+    let mut grouped = first.clone();
+    let [sum, compensation] = [first.sums.sum.clone(), first.sums.compensation.clone()];
+    let name = "key".to_owned();
+    grouped.sums.groups.push(GroupSums { name, sum, compensation, pending: Vec::new() });
+    for parts in [[(a, &grouped), (b, &second)], [(b, &second), (a, &grouped)]] {
+        assert!(merge_checkpoints(&parts).unwrap().sums.groups.is_empty());
+    }
 }
 
 #[test]

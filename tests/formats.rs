@@ -267,6 +267,8 @@ fn a_render_without_light_says_so_and_does_not_count_as_converged() {
     let size = ["lit.gltf", "--spp", "2", "--size", "8x6"];
     let found = statistics(&size);
     assert!(found.found_light && found.warnings.len() == 2, "{:?}", found.warnings);
+    let warnings: Vec<&str> = found.warnings.iter().map(String::as_str).collect();
+    folder.run(&["export", "lit.gltf", "out", "--format=mitsuba"]).assert(0, &warnings);
     let found = statistics(&[&size[..], &["--environment", "black.pfm"]].concat());
     assert!(!found.found_light && found.warnings.len() == 3, "{:?}", found.warnings);
     let camera = ["render", "dark.toml", "--camera", "a"];

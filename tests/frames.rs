@@ -44,7 +44,13 @@ fn frames_follow_the_camera_and_have_numbers_of_their_own() {
     render(&["--frames=2", "--seed=1", "-o", "other.#.exr"]).assert(0, &[]);
     folder.run(&["merge", "alone.2.exr", "other.2.exr", "-o", "both.exr"]).assert(0, &[]);
     folder.run(&["merge", "all.01.exr", "other.2.exr", "-o", "no.exr"]).assert(1, &["scene hash"]);
-    render(&["--frames=0-2", "-o", "one.exr"]).assert(2, &["every frame would have this name"]);
+    for (option, name) in
+        [("--output", "one.exr"), ("--stats", "s.json"), ("--save-guide", "g.guide")]
+    {
+        let named = format!("{option} {name}: every frame would have this name");
+        let options = ["render", "scene.toml", "--frames=0-2", option, name];
+        folder.run(&options).assert(2, &[&named]);
+    }
 }
 
 #[test]
@@ -63,8 +69,13 @@ fn a_guide_is_carried_and_finished_frames_are_skipped() {
     // A checkpoint says that the image is not finished.
     render(&["--frames=1", "--spp=1", "--checkpoint-interval=1h", "-o", "f.#.exr"]).assert(0, &[]);
     render(&frames).assert(0, &["f.0.exr is there", "frame 1 at", "f.2.exr is there"]);
-    render(&["--spp=2", "--frames=1", "-o", "whole.#.exr"]).assert(0, &[]);
+    render(&["--spp=2", "--frames=1", "-o", "whole.#.exr", "--save-guide", "g.#.guide"])
+        .assert(0, &[]);
     assert_eq!(folder.image("f.1.exr").channels, folder.image("whole.1.exr").channels);
+    // Every frame may go on from a guide of its own.
+    let own = ["--spp=1", "--frames=1", "-o", "own.#.exr", "--stats", "own.#.json"];
+    render(&[&own[..], &["--load-guide", "g.#.guide"]].concat()).assert(0, &[]);
+    assert_eq!(folder.json::<Statistics>("own.1.json").rays["camera"], 24 * 16, "no training");
 }
 
 /// Where more than the camera moves, no frame is rendered with what is on the device for the one before.

@@ -407,6 +407,12 @@ fn cells_learn_what_their_surfaces_reflect() {
     assert_eq!(again.state().counts, guide.state().counts);
     assert_eq!(again.snapshot(&partition), guide.snapshot(&partition));
     assert!(guide.counts(place)[strong].trials <= 65_536 * PARTS_PER_RAY);
+    // A divisor makes what is old count less, evidence of shares included.
+    let mut state = guide.state();
+    state.shares.fill(6);
+    let older = Guide::resume(regions, 1 << 12, 1 << 14, &state, 2).state();
+    assert!(older.shares.iter().all(|share| *share == 3));
+    assert!(older.counts.iter().zip(&state.counts).all(|(half, all)| half[0] == all[0] / 2));
 }
 
 /// Four cells: the first sees half of the rays of every region; the second all rays of half of the

@@ -28,11 +28,15 @@ fn the_first_rule_that_is_reached_ends_the_render() {
     assert_eq!((both.stop_reason.as_str(), both.samples_per_pixel), ("spp", 3));
     let time = run(&["--spp", "100000000", "--time", "300ms"]);
     assert_eq!(time.stop_reason, "time");
-    assert!(time.seconds >= 0.3 && time.samples_per_pixel > 1, "{} s", time.seconds);
+    // It ends with the nearest sample, which may be a little earlier.
+    assert!(time.seconds > 0.2 && time.samples_per_pixel > 1, "{} s", time.seconds);
     let error = run(&["--error", "0.2", "--spp", "100000"]);
     assert_eq!(error.stop_reason, "error");
     let reached = error.relative_standard_error.unwrap();
     assert!(reached <= 0.2 && error.samples_per_pixel < 100_000, "{reached}");
+    // Sixteen samples are those of a quick picture without another rule.
+    let quick = run(&["--quick", "--error", "0.02"]);
+    assert_eq!(quick.stop_reason, "error", "after {} samples", quick.samples_per_pixel);
 }
 
 #[test]
@@ -64,6 +68,9 @@ fn what_a_file_asks_for_is_taken_where_no_option_says_otherwise() {
     let (said, found) = render(&["--spp=1", "--depth=4", "--roulette-depth=2"]);
     assert!(!said.contains("asks for"), "{said}");
     assert_eq!(found, (1, 4, "2".into()));
+    let (said, found) = render(&["--quality=preview"]);
+    assert!(!said.contains("2 samples"), "{said}");
+    assert_eq!(found, (64, 5, "3".into()));
 }
 
 #[test]
@@ -82,6 +89,7 @@ fn rays_are_counted_by_kind() {
     let (_, deep) = render(&folder, "out.exr", &["--spp", "4", "--depth", "3", "--sampler", "mis"]);
     assert!(deep.rays["bounce"] > 0 && deep.rays["shadow"] > direct.rays["shadow"] / 2);
     assert_eq!(deep.dropped_samples, 0);
+    assert!(deep.host_ms["load"] > 0.02, "files are read in milliseconds: {:?}", deep.host_ms);
     for pass in ["camera", "trace", "sample", "shadow", "gather", "bounce", "accumulate"] {
         assert!(deep.gpu_ms[pass] > 0.0, "{pass}");
     }

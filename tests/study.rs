@@ -352,6 +352,14 @@ fn overhead_is_measured_in_rounds() {
     let before = changed(&folder, record);
     folder.run(&options).assert(0, &[]);
     assert_eq!(changed(&folder, record), before);
+    // A round of other samples is measured again.
+    let path = folder.path().join("report").join(record);
+    let text = fs::read_to_string(&path).unwrap();
+    let other = text.replace("\"spp\": 16", "\"spp\": 8");
+    assert_ne!(other, text);
+    fs::write(&path, other).unwrap();
+    folder.run(&options).assert(0, &[]);
+    assert_eq!(json(&folder, record)["spp"], 16);
 }
 
 #[test]

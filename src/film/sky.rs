@@ -111,5 +111,8 @@ mod tests {
         let row = ((0.5 - 0.5_f32.atan() / std::f32::consts::PI) * 32.0) as usize;
         assert_eq!(marked.pixels()[64 * row + 48], [1, 2, 3]);
         assert_eq!(marked.pixels()[64 * row + 44], [0; 3], "its rim");
+        // One behind goes on from one edge to the other.
+        marked.mark(Vec3::Z.with_y(0.5), [4, 5, 6]);
+        assert_eq!([0, 63].map(|column| marked.pixels()[64 * row + column]), [[4, 5, 6]; 2]);
     }
 }

@@ -199,6 +199,19 @@ mod tests {
     }
 
     #[test]
+    fn qualities_end_by_time_or_samples() {
+        for (quality, seconds, samples) in [
+            (Quality::Preview, 10.0, 64),
+            (Quality::Good, 50.0, 1024),
+            (Quality::Final, 600.0, 16_384),
+        ] {
+            let expected =
+                Rules { seconds: Some(seconds), samples: Some(samples), ..Rules::default() };
+            assert_eq!(quality.rules(), expected, "{}", quality.name());
+        }
+    }
+
+    #[test]
     fn standing_leaves_out_what_is_unknown() {
         let mut standing = Standing { samples: 64, ..Standing::default() };
         assert_eq!(standing.to_string(), "64 spp");

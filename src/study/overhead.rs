@@ -262,6 +262,22 @@ mod tests {
     }
 
     #[test]
+    fn rounds_over_another_baseline_are_others() {
+        let texts = ["mis", "ris:candidates=8"];
+        let samplers = Contender::parse_all(&texts, Default::default()).unwrap_or_default();
+        let described = |baseline: usize| {
+            describe_parameters(&OverheadPlan {
+                baseline: samplers[baseline].clone(),
+                contenders: vec![samplers[1 - baseline].clone()],
+                spp: 16,
+                repetitions: 2,
+            })
+        };
+        assert_eq!(described(0).len(), 2);
+        assert_ne!(described(0), described(1));
+    }
+
+    #[test]
     fn passes_add_up() {
         let overhead = &overheads(&rounds(), "product")[0];
         let pass = |name: &str| overhead.passes.iter().find(|pass| pass.pass == name);

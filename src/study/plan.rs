@@ -461,6 +461,12 @@ mod tests {
     }
 
     #[test]
+    fn halves_hold_the_samples_asked_for() {
+        let plan = plan(Options { reference_spp: Some(2049), ..Options::default() }).unwrap();
+        assert!(matches!(plan.reference, ReferencePlan::Render { half_spp: 1025, .. }));
+    }
+
+    #[test]
     fn a_reference_too_short_for_verdicts_is_named() {
         let missing = |reference_spp, spp| {
             let spp = Some(vec![8, spp]);

@@ -296,7 +296,8 @@ mod tests {
         let samplers = crate::study::contender::Contender::parse_all(&["mis"], Default::default());
         let options = Options { samplers: samplers.ok(), ..Options::default() };
         let plan = Plan::new(vec!["room.toml".into()], Description::default(), options, Vec::new());
-        let reference = OwnErrors { relmse: Some(own), ..OwnErrors::default() };
+        let (relmse, relmse_trimmed) = (Some(own), Some(0.5 * own));
+        let reference = OwnErrors { relmse, relmse_trimmed, ..OwnErrors::default() };
         let reference = Some(reference);
         let scene = StudiedScene { name: "room".into(), reference, ..StudiedScene::default() };
         times_to_quality(&plan.unwrap(), &[scene], runs)
@@ -308,7 +309,7 @@ mod tests {
         let runs: Vec<Run> =
             [(1, 0.4), (2, 1.2), (3, 0.8)].map(|(seed, scale)| run(seed, rule, scale)).into();
         let all = times(&runs, 0.006);
-        let [coarse, fine, trimmed_coarse, _] = &all[..] else { unreachable!() };
+        let [coarse, fine, trimmed_coarse, trimmed_fine] = &all[..] else { unreachable!() };
         assert_eq!((coarse.threshold, fine.threshold), (0.1, 0.02));
         assert_near(coarse.seconds, 8.0);
         assert_near(times(&[runs[0].clone(), runs[2].clone()], 0.006)[0].seconds, 6.0);
@@ -322,6 +323,7 @@ mod tests {
         // At 32 s the errors are 0.0125, 0.0375 and 0.025.
         assert_eq!((fine.reached, fine.runs, fine.seconds), (1, 3, None));
         assert!(!fine.is_judged, "0.02 is below four times 0.006");
+        assert!(trimmed_fine.is_judged, "but not below four times 0.003");
         assert_near(fine.fastest, 20.0);
         assert_eq!(fine.slowest, None);
         assert_near(Some(fine.last_error), 0.025);

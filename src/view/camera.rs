@@ -151,6 +151,10 @@ mod tests {
         let mut moved = rig();
         moved.fly(Vec3::Z, 1.0);
         assert_near(moved.camera.position, [0.0, 1.0, 4.0 - 4.0 * PACE]);
+        let mut slow = rig();
+        slow.speed = 0.25;
+        slow.fly(Vec3::Z, 1.0);
+        assert_near(slow.camera.position, [0.0, 1.0, 4.0 - PACE]);
         moved.focus(Vec3::new(3.0, 1.0, 1.0));
         assert_near(Vec3::X * moved.camera.focus_distance, [3.0 - 4.0 * PACE, 0.0, 0.0]);
         moved.go_home();
