@@ -774,6 +774,8 @@ fn lights_of_others_do_not_end_the_file() {
         let LampKind::Spot(spot) = scene.lamps[0].kind else { panic!() };
         assert_eq!(spot.outer_angle_rad, expected);
         assert_eq!(spot.inner_angle_rad, f32::min(inner, 0.999 * expected));
+        let is_named = scene.warnings.iter().any(|text| text.contains("ignored angles of spots"));
+        assert_eq!(is_named, inner != outer, "{:?}", scene.warnings);
     }
     let scene = lamp(r#"{"type": "ambient"}"#);
     assert!(scene.lamps.is_empty());

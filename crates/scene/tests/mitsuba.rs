@@ -648,6 +648,14 @@ fn spectra_become_the_colours_of_mitsuba() {
     let (lamp, warnings) = material(emitter);
     assert_eq!(lamp.surface.emission.unwrap().radiance, Vec3::splat(3.0));
     assert!(warnings.is_empty(), "{warnings:?}");
+    for (value, expected) in [("2", 1.0), ("-1", 0.0), ("0.25", 0.25)] {
+        let (paint, _) = material(&format!(
+            "<bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"uniform\">\
+             <float name=\"value\" value=\"{value}\"/></texture></bsdf>"
+        ));
+        let MaterialKind::Diffuse { reflectance } = paint.kind else { panic!() };
+        assert_eq!(reflectance, Vec3::splat(expected));
+    }
 }
 
 /// Version 0.6, for which such files were made, has white of one number, and copper without a name.

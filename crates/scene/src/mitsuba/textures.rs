@@ -70,7 +70,15 @@ impl Reader {
     ) -> Result<Option<Value>> {
         let Some(node) = parameters.any(name)? else { return Ok(None) };
         match node.tag() {
-            "texture" => self.texture(node, MAX_SCALES).map(Some),
+            "texture" => {
+                let value = self.texture(node, MAX_SCALES)?;
+                Ok(Some(match value {
+                    Value::Color(color) if role == Role::Reflectance => {
+                        Value::Color(color.min(Vec3::ONE))
+                    }
+                    value => value,
+                }))
+            }
             _ if role == Role::Reflectance => {
                 spectra::reflectance(node, &mut self.ignored).map(|color| Some(Value::Color(color)))
             }
@@ -108,7 +116,8 @@ impl Reader {
                 }
             }
             "uniform" | "srgb" | "d65" => {
-                return spectra::color_of_kind(node, Role::Light).map(Value::Color);
+                let color = spectra::color_of_kind(node, Role::Light)?;
+                return Ok(Value::Color(color.max(Vec3::ZERO)));
             }
             "scale" if scales_left > 0 => self.scaled(&parameters, scales_left)?,
             found => {

@@ -45,9 +45,13 @@ impl GltfReader<'_> {
         let kind = match light["type"].as_str() {
             Some("point") => LampKind::Point { position, intensity },
             Some("spot") => {
-                let outer = number(&light["spot"], "outerConeAngle", FRAC_PI_4);
-                let outer = outer.clamp(SMALLEST_CONE_RAD, FRAC_PI_2);
+                let stated = number(&light["spot"], "outerConeAngle", FRAC_PI_4);
+                let outer = stated.clamp(SMALLEST_CONE_RAD, FRAC_PI_2);
                 let inner = number(&light["spot"], "innerConeAngle", 0.0);
+                if !(0.0..=outer).contains(&inner) || (stated - outer).abs() > 1e-6 {
+                    let name = "angles of spots out of order or beyond π/2";
+                    self.ignored.add_named(features::GLTF_LIGHT_TYPE, name, place);
+                }
                 LampKind::Spot(Spot {
                     position,
                     direction,
