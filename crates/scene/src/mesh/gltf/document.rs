@@ -80,8 +80,7 @@ pub(super) fn parse(
     for primitive in root.meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {
         primitive.attributes.retain(|name, _| matches!(name, Checked::Valid(_)));
     }
-    check_positions(path, &root)?;
-    state_bounds(&mut root);
+    complete_positions(path, &mut root)?;
     if let Some(name) = variant {
         variants::choose(name, &mut json, &mut root)
             .map_err(|message| Error::format(path, message))?;
@@ -146,18 +145,21 @@ fn not_gltf(path: &Path, error: &gltf::Error) -> Error {
     Error::format(path, format!("not a glTF document: {message}"))
 }
 
-/// Checks that the accessor of every primitive's positions exists, on which the validation by the
-/// `gltf` crate relies.
-fn check_positions(path: &Path, root: &Root) -> Result<()> {
-    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
-        let position = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
-        if let Some(accessor) = position.map(|index| index.value())
-            && accessor >= root.accessors.len()
-        {
-            let count = root.accessors.len();
+/// Checks that the accessor of every primitive's positions exists, on which the validation by the `gltf`
+/// crate relies; states its bounds where the file leaves them out, which nobody here reads.
+fn complete_positions(path: &Path, root: &mut Root) -> Result<()> {
+    let Root { meshes, accessors, .. } = root;
+    let count = accessors.len();
+    for primitive in meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+        let Some(index) = positions.map(|index| index.value()) else { continue };
+        let accessor = accessors.get_mut(index).ok_or_else(|| {
             let message =
-                format!("a primitive's POSITION names accessor {accessor}, the file has {count}");
-            return Err(Error::format(path, format!("not a glTF document: {message}")));
+                format!("a primitive's POSITION names accessor {index}, the file has {count}");
+            Error::format(path, format!("not a glTF document: {message}"))
+        })?;
+        for bound in [&mut accessor.min, &mut accessor.max] {
+            bound.get_or_insert_with(|| json!([0.0, 0.0, 0.0]));
         }
     }
     Ok(())
@@ -177,18 +179,6 @@ pub(super) fn beside(path: &Path, uri: &str) -> Result<PathBuf> {
 pub(super) fn data_of(uri: &str) -> Option<Option<Vec<u8>>> {
     let data = uri.strip_prefix("data:")?;
     Some(data.split_once(";base64,").and_then(|(_, text)| BASE64.decode(text).ok()))
-}
-
-/// States the bounds of positions, which files leave out and nobody here reads, for the validation.
-fn state_bounds(root: &mut Root) {
-    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
-        if let Some(index) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) {
-            let accessor = &mut root.accessors[index.value()];
-            for bound in [&mut accessor.min, &mut accessor.max] {
-                bound.get_or_insert_with(|| json!([0.0, 0.0, 0.0]));
-            }
-        }
-    }
 }
 
 /// Adds the nodes of empty scenes; removes extras, which may be anything and not objects alone, members that
