@@ -616,3 +616,25 @@ fn images_of_radiance_keep_it_in_gltf() {
     assert!(ours.abs_diff_eq(Vec3::new(8.0, 2.0, 0.5), 1e-3), "{ours}");
     assert!(read.abs_diff_eq(ours, 0.02 * ours.x), "{read}, expected {ours}");
 }
+
+#[test]
+fn coats_go_to_gltf_alone() {
+    let clay = "type = \"principled\"\nbase_color = [0.5, 0.2, 0.1]\nroughness = 0.5\n\
+        coat_weight = 0.5\ncoat_roughness = 0.25";
+    let (folder, _, warnings, [ours, _]) = both(clay, "");
+    let is_named = |text: &String| text.contains("its coat is left out");
+    assert!(warnings.iter().any(is_named), "{warnings:?}");
+    assert!(
+        pbrt::export(&ours, &folder.path().join("out.pbrt"), SETTINGS)
+            .warnings
+            .iter()
+            .any(is_named)
+    );
+    let path = folder.path().join("out.gltf");
+    let exported = gltf::export(&ours, &path);
+    assert!(!exported.warnings.iter().any(is_named));
+    exported.write().unwrap();
+    let numbers = |scene: &Scene| scene.materials[0].kind.parameters().2;
+    assert_eq!(numbers(&Scene::load(&path).unwrap()), numbers(&ours));
+    assert_eq!(numbers(&ours)[2], [0.5, 0.25]);
+}

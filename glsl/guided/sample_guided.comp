@@ -25,7 +25,7 @@ uint brdf_share(Material material) {
     uint share = 77u;
     if (is_diffuse(material)) {
         share = 26u;
-    } else if (is_kind(material, MATERIAL_PRINCIPLED) && material.ior < 0.5) {
+    } else if (is_principled(material) && material.ior < 0.5) {
         // Most light of a principled dielectric comes from its diffuse base.
         share = material.alpha > 0.1 ? 26u : 77u;
     } else if (!is_kind(material, MATERIAL_MEASURED)) {

@@ -12,6 +12,9 @@
 #include "layout.glsl"
 #include "surfaces.glsl"
 
+// Reflectance of a coat at normal incidence, of refractive index 1.5. Twin: src/brdf/value.rs.
+const float COAT_REFLECTANCE = 0.04;
+
 // One buffer, seen as floats and as cells of four halves.
 TEXELS(brdf_table)
 TEXELS(brdf_cells)
@@ -26,6 +29,11 @@ bool is_kind(Material material, uint kind) {
 // Tests for a material that scatters alike to all directions of a side.
 bool is_diffuse(Material material) {
     return is_kind(material, MATERIAL_DIFFUSE) || is_kind(material, MATERIAL_DIFFUSE_TRANSMISSION);
+}
+
+// Tests for a metallic-roughness material, with or without a coat.
+bool is_principled(Material material) {
+    return is_kind(material, MATERIAL_PRINCIPLED) || is_kind(material, MATERIAL_COATED);
 }
 
 // Word of the BRDF table as a float.
@@ -86,6 +94,14 @@ float principled_specular_share(Material material, float cosine) {
     float specular = dot(albedo.specular, LUMINANCE_WEIGHTS);
     float sum = specular + dot(albedo.diffuse, LUMINANCE_WEIGHTS);
     return sum > 0.0 ? specular / sum : 0.5;
+}
+
+// Probability of sampling the coat of a principled material.
+float coat_share(Material material, float cosine) {
+    PrincipledAlbedo albedo = principled_albedo(material, cosine);
+    float coat = cosine_table(material.coat_table, 1u, cosine);
+    float base = (1.0 - coat) * dot(albedo.specular + albedo.diffuse, LUMINANCE_WEIGHTS);
+    return coat / (coat + base);
 }
 
 // Metal and dielectric in one: `reflection` is that of GGX at unit reflectance. glTF 2.0, appendix B.
@@ -183,7 +199,9 @@ struct Reflector {
     vec3 outgoing_local;
     // Probability of sampling the specular part; of a measured material, the cosine lobe.
     float share;
-    // Light that enters the base of a plastic from the outgoing direction.
+    // Probability of sampling the coat of a principled material; `share` is that of the rest.
+    float coat_share;
+    // Light that enters the base of a plastic, or what a coat covers, from the outgoing direction.
     float transmission;
     // ggx_stretched_length and ggx_cap_factor of the outgoing direction.
     float stretched;
@@ -200,7 +218,7 @@ Reflector reflector_from(Material material, vec3 outgoing_local) {
         outgoing_local.z = abs(outgoing_local.z);
     }
     Reflector reflector = Reflector(
-        material, outgoing_local, 0.0, 0.0, ggx_stretched_length(outgoing_local, material.alpha),
+        material, outgoing_local, 0.0, 0.0, 0.0, ggx_stretched_length(outgoing_local, material.alpha),
         ggx_cap_factor(outgoing_local, material.alpha), 0u);
     if (is_kind(material, MATERIAL_CONDUCTOR)) {
         reflector.share = 1.0;
@@ -210,10 +228,15 @@ Reflector reflector_from(Material material, vec3 outgoing_local) {
         reflector.share =
             cosine_table(offset + PLASTIC_SPECULAR_SHARE_OFFSET, 1u, outgoing_local.z);
         reflector.transmission =
-            cosine_table(offset + PLASTIC_TRANSMISSION_OFFSET, 1u, outgoing_local.z);
+            cosine_table(offset + COAT_TRANSMISSION_OFFSET, 1u, outgoing_local.z);
     }
-    if (is_kind(material, MATERIAL_PRINCIPLED)) {
+    if (is_principled(material)) {
         reflector.share = principled_specular_share(material, outgoing_local.z);
+    }
+    if (is_kind(material, MATERIAL_COATED)) {
+        reflector.transmission = cosine_table(
+            material.coat_table + COAT_TRANSMISSION_OFFSET, 1u, outgoing_local.z);
+        reflector.coat_share = coat_share(material, outgoing_local.z);
     }
     if (is_kind(material, MATERIAL_MEASURED)) {
         reflector.elevation = measured_elevation_bin(outgoing_local);
@@ -286,6 +309,26 @@ vec3 measured_sample(Reflector reflector, vec3 u) {
     return 2.0 * dot(outgoing_local, half_vector) * half_vector - outgoing_local;
 }
 
+// Adds the coat to value and density of a principled material. Light between both is as that of
+// a plastic's coat and diffuse base [Kelemen & Szirmay-Kalos 2001].
+void cover(
+    Reflector reflector, vec3 incident_local, vec3 half_vector, float cosine_difference,
+    inout vec3 value, inout float pdf) {
+    Material material = reflector.material;
+    vec3 outgoing_local = reflector.outgoing_local;
+    float stretched = ggx_stretched_length(outgoing_local, material.coat_alpha);
+    float reflection = ggx_reflection(
+        half_vector, outgoing_local, stretched, incident_local, material.coat_alpha);
+    float fresnel = mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine_difference));
+    float base = reflector.transmission
+        * cosine_table(material.coat_table + COAT_TRANSMISSION_OFFSET, 1u, incident_local.z);
+    value = base * value + vec3(material.coat_weight * fresnel * reflection);
+    float coat_pdf = ggx_pdf(
+        half_vector, outgoing_local, stretched,
+        ggx_cap_factor(outgoing_local, material.coat_alpha), material.coat_alpha);
+    pdf = mix(pdf, coat_pdf, reflector.coat_share);
+}
+
 // Value (1/sr, without the cosine) and density of brdf_sample at one pair of directions. The density
 // integrates over the hemisphere to 1 less the share of samples below the surface.
 void brdf_evaluate_and_pdf(
@@ -318,13 +361,16 @@ void brdf_evaluate_and_pdf(
     if (is_kind(material, MATERIAL_PLASTIC)) {
         float base = reflector.transmission
             * cosine_table(
-                material.table_offset + PLASTIC_TRANSMISSION_OFFSET, 1u, incident_local.z) / PI;
+                material.table_offset + COAT_TRANSMISSION_OFFSET, 1u, incident_local.z) / PI;
         value = vec3(reflection * fresnel_dielectric(cosine_difference, material.ior))
             + base * material.reflectance;
         pdf = mix(cosine_pdf, pdf, reflector.share);
-    } else if (is_kind(material, MATERIAL_PRINCIPLED)) {
+    } else if (is_principled(material)) {
         value = principled_value(material, reflection, cosine_difference);
         pdf = mix(cosine_pdf, pdf, reflector.share);
+        if (is_kind(material, MATERIAL_COATED)) {
+            cover(reflector, incident_local, half_vector, cosine_difference, value, pdf);
+        }
     } else if (is_kind(material, MATERIAL_CONDUCTOR) && material.ior > 0.0) {
         value = reflection * fresnel_conductor(cosine_difference, material.eta, material.k);
     } else if (is_kind(material, MATERIAL_CONDUCTOR)) {
@@ -348,14 +394,22 @@ vec3 brdf_sample(Reflector reflector, vec3 u) {
     Material material = reflector.material;
     bool is_sampled = is_diffuse(material) || is_kind(material, MATERIAL_PLASTIC)
         || is_kind(material, MATERIAL_CONDUCTOR) || is_kind(material, MATERIAL_MEASURED)
-        || is_kind(material, MATERIAL_PRINCIPLED);
+        || is_principled(material);
     if (reflector.outgoing_local.z <= 0.0 || !is_sampled) {
         return vec3(0.0, 0.0, -1.0);
     }
     if (is_kind(material, MATERIAL_MEASURED)) {
         return measured_sample(reflector, u);
     }
-    if (u.x < reflector.share) {
+    float share = reflector.share;
+    if (is_kind(material, MATERIAL_COATED)) {
+        if (u.x < reflector.coat_share) {
+            float cap_factor = ggx_cap_factor(reflector.outgoing_local, material.coat_alpha);
+            return ggx_sample(reflector.outgoing_local, material.coat_alpha, cap_factor, u.yz);
+        }
+        share = mix(share, 1.0, reflector.coat_share);
+    }
+    if (u.x < share) {
         return ggx_sample(reflector.outgoing_local, material.alpha, reflector.cap_factor, u.yz);
     }
     return sample_cosine_hemisphere(u.yz);
@@ -376,8 +430,18 @@ vec3 brdf_albedo(Material material, vec3 outgoing_local) {
         float coat = cosine_table(offset, 1u, outgoing_local.z);
         return vec3(coat) + (1.0 - coat) * material.reflectance;
     }
-    if (is_kind(material, MATERIAL_PRINCIPLED)) {
+    if (is_principled(material)) {
         PrincipledAlbedo albedo = principled_albedo(material, outgoing_local.z);
+        if (is_kind(material, MATERIAL_COATED)) {
+            float coat = cosine_table(material.coat_table, 1u, outgoing_local.z);
+            float transmission = cosine_table(
+                material.coat_table + COAT_TRANSMISSION_OFFSET, 1u, outgoing_local.z);
+            // Smooth surfaces send on light of the same elevation, rough ones of all.
+            float spread = material.alpha / (material.alpha + 0.05);
+            albedo.specular *= mix(transmission * transmission, 1.0 - coat, spread);
+            albedo.specular += vec3(coat);
+            albedo.diffuse *= 1.0 - coat;
+        }
         return min(albedo.specular + albedo.diffuse, vec3(1.0));
     }
     if (is_kind(material, MATERIAL_CONDUCTOR) && material.ior == 0.0) {

@@ -21,8 +21,9 @@ bool is_specular(uint kind) {
 
 // Material as the textures at a place vary it.
 Material varied(Material material, Surface surface) {
+    bool is_principled = material.kind == MATERIAL_PRINCIPLED || material.kind == MATERIAL_COATED;
     material.reflectance = surface.reflectance;
     material.alpha = surface.alpha;
-    material.ior = material.kind == MATERIAL_PRINCIPLED ? surface.metallic : material.ior;
+    material.ior = is_principled ? surface.metallic : material.ior;
     return material;
 }

@@ -7,9 +7,9 @@ use glam::{Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;
 
 use crate::{
-    brdf::{fresnel::*, ggx::*},
+    brdf::{fresnel::*, ggx::*, value::COAT_REFLECTANCE},
     math::colour::luminance,
-    scene::measured::lookup::sample_cosine_hemisphere,
+    scene::measured::lookup::{mix, sample_cosine_hemisphere},
     shader::constants::*,
 };
 
@@ -50,10 +50,10 @@ fn ggx_albedo(outgoing: Vec3, alpha: f32, points: u32, fresnel: impl Fn(f32) -> 
     (sum / f64::from(points * points)).as_vec3()
 }
 
-/// Words of a plastic: directional albedo of the coat, transmission into and out of the base,
-/// probability of sampling the coat; see `PLASTIC_…_OFFSET`.
-pub(crate) fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
-    let fresnel = |cosine| Vec3::splat(fresnel_dielectric(cosine, ior));
+/// Tables of a coat that covers the share `weight` of a surface: directional albedo E, and transmission into
+/// and out of what it covers, T² = (1 − E)²/(1 − Ē).
+fn coat_tables(weight: f32, alpha: f32, fresnel: impl Fn(f32) -> f32 + Sync) -> [Vec<f32>; 2] {
+    let fresnel = |cosine| Vec3::splat(fresnel(cosine));
     let coat_albedo = |direction| ggx_albedo(direction, alpha, FINE_POINTS, fresnel).x.min(1.0);
     let mut coat: Vec<f32> = (0..BRDF_COSINE_NODES)
         .into_par_iter()
@@ -67,6 +67,7 @@ pub(crate) fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
         (e - fraction * coat[1]) / (1.0 - fraction)
     });
     coat[0] = horizon.fold(coat[0], f32::max).min(1.0);
+    coat.iter_mut().for_each(|e| *e *= weight);
     // Integrate Ē = 2∫E(μ)μ dμ of the piecewise linear E exactly, so that the interpolated base
     // conserves energy: per interval of width w, ∫ = w·(μ₀(2E₀+E₁)+μ₁(E₀+2E₁))/6.
     let width = 1.0 / f64::from(BRDF_COSINE_INTERVALS);
@@ -81,16 +82,25 @@ pub(crate) fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
         })
         .sum();
     let normalisation = (1.0 / (1.0 - mean).max(1e-6).sqrt()) as f32;
+    let transmission = coat.iter().map(|&e| (1.0 - e) * normalisation).collect();
+    [coat, transmission]
+}
+
+/// Words of a plastic: directional albedo of the coat, transmission into and out of the base,
+/// probability of sampling the coat; see `COAT_TRANSMISSION_OFFSET` and `PLASTIC_SPECULAR_SHARE_OFFSET`.
+pub(crate) fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
+    let [coat, transmission] = coat_tables(1.0, alpha, |cosine| fresnel_dielectric(cosine, ior));
     let specular_share = coat.iter().map(|&e| {
         let base = luminance(diffuse) * (1.0 - e);
         if e + base > 0.0 { e / (e + base) } else { 0.5 }
     });
-    coat.iter()
-        .copied()
-        .chain(coat.iter().map(|&e| (1.0 - e) * normalisation))
-        .chain(specular_share)
-        .map(f32::to_bits)
-        .collect()
+    coat.iter().copied().chain(transmission).chain(specular_share).map(f32::to_bits).collect()
+}
+
+/// Words of the coat of a principled material: the first two tables of a plastic.
+pub(crate) fn coat_words(weight: f32, alpha: f32) -> Vec<u32> {
+    let fresnel = |cosine| mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine));
+    coat_tables(weight, alpha, fresnel).concat().into_iter().map(f32::to_bits).collect()
 }
 
 /// Words of a conductor with exact Fresnel: directional albedo.

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use crate::{
     brdf::{
-        albedo::{GGX_WORDS, conductor_words, ggx_words, plastic_words},
+        albedo::{GGX_WORDS, coat_words, conductor_words, ggx_words, plastic_words},
         ggx::SMALLEST_ALPHA,
     },
     error::{Error, Result},
@@ -97,6 +97,14 @@ impl MaterialTables {
                         .to_array();
                     converted.k = [own.specular; 3];
                     converted.table_offset = ggx_table(&mut tables);
+                    if own.coat_weight > 0.0 {
+                        converted.kind = MATERIAL_COATED;
+                        converted.coat_weight = own.coat_weight;
+                        converted.coat_alpha =
+                            (own.coat_roughness * own.coat_roughness).max(SMALLEST_ALPHA);
+                        let words = coat_words(own.coat_weight, converted.coat_alpha);
+                        converted.coat_table = tables.append(&words);
+                    }
                 }
                 MaterialKind::Mirror { reflectance } => {
                     converted.kind = MATERIAL_MIRROR;

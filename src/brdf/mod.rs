@@ -13,6 +13,7 @@
 //! | plastic | GGX coat, exact dielectric Fresnel, over ρ/π·T(θ_o)·T(θ_i), T² = (1−E)²/(1−Ē) | visible normals or cosine, by albedo |
 //! | conductor | GGX, exact conductor Fresnel or Schlick's | visible normals |
 //! | principled | GGX with Schlick's reflectance, over (1−metallic)·(1−F)·ρ/π | visible normals or cosine, by albedo |
+//! | coated | GGX coat with Schlick's reflectance, over principled·T(θ_o)·T(θ_i) | visible normals of either or cosine, by albedo |
 //! | measured | trilinear on the half/difference grid | tabulated half vectors or cosine |
 //!
 //! E(θ) is the directional albedo of the coat and Ē its cosine-weighted mean. Coat and base

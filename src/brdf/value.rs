@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use crate::{
     brdf::{fresnel::*, ggx::*},
-    scene::measured::lookup::{cosine_table, half_difference_angles, measured_value},
+    scene::measured::lookup::{cosine_table, half_difference_angles, measured_value, mix},
     shader::{constants::*, structs::Material},
 };
 
@@ -16,6 +16,9 @@ use crate::{
 fn mix_vec3(a: Vec3, b: Vec3, fraction: f32) -> Vec3 {
     a * (1.0 - fraction) + b * fraction
 }
+
+/// Reflectance of a coat at normal incidence, of refractive index 1.5. Twin: `glsl/include/brdf.glsl`.
+pub(super) const COAT_REFLECTANCE: f32 = 0.04;
 
 /// Metal and dielectric in one: `reflection` is that of GGX at unit reflectance. glTF 2.0, appendix B.
 fn principled_value(material: &Material, reflection: f32, cosine_difference: f32) -> Vec3 {
@@ -67,16 +70,25 @@ pub fn brdf_evaluate(
     let half_vector = outgoing_local + incident_local;
     let cosine_difference = (0.5 * half_vector.length()).min(1.0);
     let reflection = ggx_reflection(half_vector, outgoing_local, incident_local, material.alpha);
+    // Light that a coat lets in and out.
+    let through = |table: u32| {
+        let at = |cosine| cosine_table(brdf_table, table + COAT_TRANSMISSION_OFFSET, 1, cosine);
+        at(outgoing_local.z) * at(incident_local.z)
+    };
     match material.kind {
         MATERIAL_PLASTIC => {
-            let transmission = material.table_offset + PLASTIC_TRANSMISSION_OFFSET;
-            let base = cosine_table(brdf_table, transmission, 1, outgoing_local.z)
-                * cosine_table(brdf_table, transmission, 1, incident_local.z)
-                / PI;
+            let base = through(material.table_offset) / PI;
             let coat = reflection * fresnel_dielectric(cosine_difference, material.ior);
             Vec3::splat(coat) + base * reflectance
         }
         MATERIAL_PRINCIPLED => principled_value(material, reflection, cosine_difference),
+        MATERIAL_COATED => {
+            let alpha = material.coat_alpha;
+            let coat = ggx_reflection(half_vector, outgoing_local, incident_local, alpha);
+            let fresnel = mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine_difference));
+            let base = principled_value(material, reflection, cosine_difference);
+            through(material.coat_table) * base + Vec3::splat(material.coat_weight * fresnel * coat)
+        }
         MATERIAL_CONDUCTOR if material.ior > 0.0 => {
             let (eta, k) = (Vec3::from(material.eta), Vec3::from(material.k));
             reflection * fresnel_conductor(cosine_difference, eta, k)

@@ -234,6 +234,8 @@ constants! {
     MATERIAL_THIN_DIELECTRIC = 7;
     /// Thin sheet that scatters light to both sides.
     MATERIAL_DIFFUSE_TRANSMISSION = 8;
+    /// Metallic-roughness material below a clear coat.
+    MATERIAL_COATED = 9;
     /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
     SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
 
@@ -305,9 +307,9 @@ constants! {
     /// Nodes of such a table.
     BRDF_COSINE_NODES = BRDF_COSINE_INTERVALS + 1;
     /// Transmission of a plastic; the albedo of the coat is at 0.
-    PLASTIC_TRANSMISSION_OFFSET = BRDF_COSINE_NODES;
+    COAT_TRANSMISSION_OFFSET = BRDF_COSINE_NODES;
     /// Probability of sampling a plastic's coat.
-    PLASTIC_SPECULAR_SHARE_OFFSET = PLASTIC_TRANSMISSION_OFFSET + BRDF_COSINE_NODES;
+    PLASTIC_SPECULAR_SHARE_OFFSET = COAT_TRANSMISSION_OFFSET + BRDF_COSINE_NODES;
     /// Intervals in the roughness √α of the albedo of all GGX surfaces with a Schlick reflectance.
     GGX_ROUGHNESS_INTERVALS = 16;
     /// Words of one roughness: factors of the reflectance at normal and at grazing incidence, by cosine.

@@ -404,8 +404,12 @@ structs! {
         /// Extinction coefficient of a conductor, absorption per metre inside a dielectric, or reflectance
         /// of a principled dielectric at grazing incidence.
         k: vec3,
-        /// Zero; pads the last of four texels of four words.
-        reserved: vec3,
+        /// Share of a principled material that a coat covers.
+        coat_weight: float,
+        /// GGX width α of the coat.
+        coat_alpha: float,
+        /// First word of the coat's own table in the BRDF table buffer.
+        coat_table: uint,
     }
 
     /// Texture as a property of a material reads it: value = scale · texel + bias.

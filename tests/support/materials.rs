@@ -38,6 +38,22 @@ pub fn principled(base_color: Vec3, metallic: f32, roughness: f32) -> MaterialKi
     MaterialKind::Principled(own)
 }
 
+/// A principled material below a coat: metallic, specular, roughness, weight and roughness of the coat.
+fn coated(
+    base_color: Vec3,
+    [metallic, specular, roughness, coat_weight, coat_roughness]: [f32; 5],
+) -> MaterialKind {
+    MaterialKind::Principled(Principled {
+        base_color,
+        metallic,
+        roughness,
+        specular,
+        coat_weight,
+        coat_roughness,
+        ..Principled::default()
+    })
+}
+
 /// Gold near 600, 550 and 450 nm.
 const GOLD: ConductorFresnel =
     ConductorFresnel::Exact { eta: vec3(0.18, 0.42, 1.37), k: vec3(3.42, 2.35, 1.77) };
@@ -101,8 +117,14 @@ pub fn cases() -> &'static [Case] {
                     ior: 1.8,
                     specular: 0.6,
                     specular_color: vec3(1.0, 2.0, 20.0),
+                    ..Principled::default()
                 }),
             ),
+            case("polished paint", 1e-3, coated(vec3(0.6, 0.1, 0.05), [0.0, 1.0, 0.5, 1.0, 0.0])),
+            case("coated white", 0.06, coated(Vec3::ONE, [0.0, 0.0, 1.0, 1.0, 0.25])),
+            case("coated metal", 0.1, coated(vec3(1.0, 0.7, 0.3), [1.0, 1.0, 0.5, 0.7, 0.2])),
+            case("rough coat", 0.04, coated(vec3(0.8, 0.4, 0.2), [0.4, 1.0, 0.2, 1.0, 0.6])),
+            case("coated black", 0.06, coated(Vec3::ZERO, [0.0, 0.0, 1.0, 1.0, 0.25])),
             case(
                 "sheet",
                 1.0,

@@ -94,6 +94,14 @@ fn principled_specular_share(brdf_table: &[u32], material: &Material, cosine: f3
     if sum > 0.0 { specular / sum } else { 0.5 }
 }
 
+/// Probability of sampling the coat of a principled material.
+fn coat_share(brdf_table: &[u32], material: &Material, cosine: f32) -> f32 {
+    let albedo = principled_albedo(brdf_table, material, cosine);
+    let coat = cosine_table(brdf_table, material.coat_table, 1, cosine);
+    let base = (1.0 - coat) * luminance(albedo.specular + albedo.diffuse);
+    coat / (coat + base)
+}
+
 /// Value (1/sr, without the cosine) and density of [`brdf_sample`] at one pair of directions.
 ///
 /// # Panics
@@ -119,19 +127,23 @@ pub fn brdf_evaluate_and_pdf(
             let theta_half = half_difference_angles(outgoing_local, incident_local).x;
             measured_pdf(brdf_table, offset, outgoing_local, incident_local, theta_half)
         }
-        MATERIAL_PLASTIC | MATERIAL_PRINCIPLED => {
+        MATERIAL_PLASTIC | MATERIAL_PRINCIPLED | MATERIAL_COATED => {
             let share = specular_share(brdf_table, material, outgoing_local.z);
             mix(cosine_pdf, specular_pdf(), share)
         }
         MATERIAL_CONDUCTOR => specular_pdf(),
         _ => 0.0,
     };
+    if material.kind == MATERIAL_COATED {
+        let coat_pdf = ggx_pdf(half_vector, outgoing_local, material.coat_alpha);
+        return (value, mix(pdf, coat_pdf, coat_share(brdf_table, material, outgoing_local.z)));
+    }
     (value, pdf)
 }
 
 /// Probability of sampling the specular part of a material that has another.
 fn specular_share(brdf_table: &[u32], material: &Material, cosine: f32) -> f32 {
-    if material.kind == MATERIAL_PRINCIPLED {
+    if matches!(material.kind, MATERIAL_PRINCIPLED | MATERIAL_COATED) {
         return principled_specular_share(brdf_table, material, cosine);
     }
     let offset = material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET;
@@ -148,7 +160,7 @@ pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
     if outgoing_local.z <= 0.0 {
         return vec3(0.0, 0.0, -1.0);
     }
-    let specular_share = match material.kind {
+    let mut specular_share = match material.kind {
         MATERIAL_MEASURED => {
             return measured_sample(brdf_table, material.table_offset, outgoing_local, u);
         }
@@ -157,11 +169,18 @@ pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
         }
         MATERIAL_DIFFUSE | MATERIAL_DIFFUSE_TRANSMISSION => 0.0,
         MATERIAL_CONDUCTOR => 1.0,
-        MATERIAL_PLASTIC | MATERIAL_PRINCIPLED => {
+        MATERIAL_PLASTIC | MATERIAL_PRINCIPLED | MATERIAL_COATED => {
             specular_share(brdf_table, material, outgoing_local.z)
         }
         kind => panic!("material of the unknown kind {kind}"),
     };
+    if material.kind == MATERIAL_COATED {
+        let coat_share = coat_share(brdf_table, material, outgoing_local.z);
+        if u.x < coat_share {
+            return ggx_sample(outgoing_local, material.coat_alpha, vec2(u.y, u.z));
+        }
+        specular_share = mix(specular_share, 1.0, coat_share);
+    }
     if u.x < specular_share {
         return ggx_sample(outgoing_local, material.alpha, vec2(u.y, u.z));
     }
@@ -187,8 +206,18 @@ pub fn brdf_albedo(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
             let coat = cosine_table(brdf_table, offset, 1, cosine);
             Vec3::splat(coat) + (1.0 - coat) * reflectance
         }
-        MATERIAL_PRINCIPLED => {
-            let albedo = principled_albedo(brdf_table, material, cosine);
+        MATERIAL_PRINCIPLED | MATERIAL_COATED => {
+            let mut albedo = principled_albedo(brdf_table, material, cosine);
+            if material.kind == MATERIAL_COATED {
+                let table = material.coat_table;
+                let coat = cosine_table(brdf_table, table, 1, cosine);
+                let transmission =
+                    cosine_table(brdf_table, table + COAT_TRANSMISSION_OFFSET, 1, cosine);
+                let spread = material.alpha / (material.alpha + 0.05);
+                albedo.specular *= mix(transmission * transmission, 1.0 - coat, spread);
+                albedo.specular += coat;
+                albedo.diffuse *= 1.0 - coat;
+            }
             (albedo.specular + albedo.diffuse).min(Vec3::ONE)
         }
         MATERIAL_CONDUCTOR if material.ior == 0.0 => {

@@ -49,7 +49,8 @@ features! {
         "specular texture of `KHR_materials_pbrSpecularGlossiness` on other coordinates than the diffuse one"
         "its mean colour counts; its glossiness is read";
     GLTF_SHEET "gloss, metal, volume and own pattern of `KHR_materials_diffuse_transmission`" "left out";
-    GLTF_CLEARCOAT "`KHR_materials_clearcoat`" "without the gloss of the coat";
+    GLTF_CLEARCOAT "coat on glass or a sheet" "left out";
+    GLTF_CLEARCOAT_TEXTURE "textures of `KHR_materials_clearcoat`" "their means; normals as below the coat";
     GLTF_SHEEN "`KHR_materials_sheen`" "without the bright rim of cloth";
     GLTF_IRIDESCENCE "`KHR_materials_iridescence`" "reflections without the colours of thin films";
     GLTF_ANISOTROPY "`KHR_materials_anisotropy`" "highlights are round";
@@ -85,7 +86,7 @@ features! {
     MTL_TRANSPARENT "`Tr 1` without `d`" "opaque";
     MTL_OUTSIDE "images whose names are absolute or lead out of the folder of the scene"
         "rendered without";
-    MTL_KEY "other keys, by name" "`map_Ks`, `refl` and `Pc` among them";
+    MTL_KEY "other keys, by name" "`map_Ks` and `refl` among them";
 }
 
 features! {
@@ -118,7 +119,7 @@ features! {
     PBRT_DISPLACEMENT "`displacement` of shapes, or beside a `normalmap`" "left out";
     PBRT_MISSING "files of shapes that are not there" "left out";
     PBRT_FLAT "shapes whose transformation flattens space" "left out";
-    PBRT_COATED_CONDUCTOR "coat of `coatedconductor`" "rendered as the bare conductor";
+    PBRT_COAT_INDEX "`interface.eta` other than 1.5" "the coat reflects as one of 1.5";
     PBRT_TRANSMISSION "images of `diffusetransmission` that differ"
         "the ratio of `reflectance` to `transmittance` is the same everywhere";
     PBRT_SUBSURFACE "light below `subsurface`" "rendered as plastic";
@@ -154,7 +155,7 @@ features! {
     MI_TEXTURE "other textures, by name" "0.5";
     MI_PHONG "`phong` and `ward`" "a metallic-roughness material of the same colours";
     MI_POLARIZED "polarisation of `pplastic`" "as `roughplastic`";
-    MI_COATING "`coating` of other models than `diffuse`" "left out";
+    MI_COATING "`coating` of other models than `diffuse` and metals" "left out";
     MI_WEIGHTS "sum of `weights` of `mixturebsdf` other than 1" "their ratios count";
     MI_CUT_LIGHT "light of `null`, or of a textured `mask`" "black, or as much as is opaque";
     MI_TWO_MODELS "second model of `twosided`" "the first is on both sides";
@@ -187,12 +188,13 @@ features! {
 }
 
 /// Extensions of glTF that are read.
-pub const GLTF_EXTENSIONS: [&str; 16] = [
+pub const GLTF_EXTENSIONS: [&str; 17] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",

@@ -182,7 +182,10 @@ impl MaterialKind {
             Self::Measured { .. } => ("measured", 4, Vec::new()),
             Self::Principled(own) => {
                 let numbers = vec![own.metallic, own.roughness, own.ior, own.specular];
-                ("principled", 5, vec![colors(&[&own.base_color, &own.specular_color]), numbers])
+                let coat = vec![own.coat_weight, own.coat_roughness];
+                let mut groups = vec![colors(&[&own.base_color, &own.specular_color]), numbers];
+                groups.extend((own.coat_weight > 0.0).then_some(coat));
+                ("principled", 5, groups)
             }
             Self::Mirror { reflectance } => ("mirror", 6, vec![colors(&[reflectance])]),
             Self::Dielectric { ior, alpha, reflectance, transmittance, absorption } => {
@@ -247,8 +250,9 @@ impl MaterialKind {
     }
 }
 
-/// Metallic-roughness material of glTF 2.0, appendix B, with `KHR_materials_ior` and
-/// `KHR_materials_specular`; by default the white metal that glTF takes where a file states nothing.
+/// Metallic-roughness material of glTF 2.0, appendix B, with `KHR_materials_ior`,
+/// `KHR_materials_specular` and `KHR_materials_clearcoat`; by default the white metal that glTF takes where a
+/// file states nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Principled {
     /// Albedo of the dielectric's base, and reflectance of the metal at normal incidence, 0…1.
@@ -263,12 +267,37 @@ pub struct Principled {
     pub specular: f32,
     /// Factor of the dielectric's reflectance at normal incidence.
     pub specular_color: Vec3,
+    /// Share of the surface below a clear coat of refractive index 1.5, 0…1.
+    ///
+    /// Deviation: the coat dims what it covers for light that enters as for light that leaves, so that the
+    /// material is reciprocal; glTF dims by the direction of the viewer alone.
+    pub coat_weight: f32,
+    /// Roughness √α of the coat, 0…1.
+    pub coat_roughness: f32,
+}
+
+impl Principled {
+    /// Metal below a whole coat; `reflectance` is that of the metal, seen from the coat, at normal incidence.
+    pub(crate) fn coated_metal(reflectance: Vec3, alpha: f32, coat_roughness: f32) -> Self {
+        let (coat_weight, roughness) = (1.0, alpha.sqrt());
+        let base_color = reflectance.clamp(Vec3::ZERO, Vec3::ONE);
+        Self { base_color, roughness, coat_weight, coat_roughness, ..Self::default() }
+    }
 }
 
 impl Default for Principled {
     fn default() -> Self {
         let (base_color, specular_color) = (Vec3::ONE, Vec3::ONE);
-        Self { base_color, metallic: 1.0, roughness: 1.0, ior: 1.5, specular: 1.0, specular_color }
+        Self {
+            base_color,
+            metallic: 1.0,
+            roughness: 1.0,
+            ior: 1.5,
+            specular: 1.0,
+            specular_color,
+            coat_weight: 0.0,
+            coat_roughness: 0.0,
+        }
     }
 }
 

@@ -64,7 +64,9 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
         "emissiveFactor": [1, 0.5, 0], "emissiveTexture": {"index": 0},
         "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4},
             "KHR_materials_ior": {"ior": 1.4}, "KHR_materials_specular":
-                {"specularFactor": 0.5, "specularColorFactor": [2, 1, 1]}}}"#;
+                {"specularFactor": 0.5, "specularColorFactor": [2, 1, 1]},
+            "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25,
+                "clearcoatNormalTexture": {"index": 1, "scale": 0.5}}}}"#;
     let (found, warnings) = gltf_material(&folder, material, &rest);
     assert_eq!(warnings, [""; 0]);
     let MaterialKind::Principled(Principled {
@@ -74,12 +76,30 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
         ior,
         specular,
         specular_color,
+        coat_weight,
+        coat_roughness,
     }) = found.kind
     else {
         panic!("{found:?}")
     };
     assert_eq!((base_color, metallic), (Vec3::new(0.8, 0.6, 0.4), 0.25));
     assert_eq!((roughness, ior, specular), (0.5, 1.4, 0.5));
+    assert_eq!((coat_weight, coat_roughness), (0.5, 0.25));
+    // Images of a coat count by their means, and it has no normals of its own.
+    let images = r#""clearcoatTexture": {"index": 0}, "clearcoatRoughnessTexture": {"index": 0}"#;
+    let normal = r#""clearcoatNormalTexture": {"index": 1, "scale": 0.5}"#;
+    let (coat, warnings) = gltf_material(&folder, &material.replace(normal, images), &rest);
+    let MaterialKind::Principled(Principled { coat_weight, coat_roughness, .. }) = coat.kind else {
+        panic!()
+    };
+    let of = |channels| {
+        let encoding = Encoding::Linear;
+        TextureUse { channels, encoding, ..found.surface.color.clone().unwrap() }
+    };
+    let [red, green] = [Channels::Red, Channels::Green].map(|channel| of(channel).mean()[0]);
+    assert!((coat_weight - 0.5 * red).abs() < 1e-6 && red < 0.9, "{coat_weight} {red}");
+    assert!((coat_roughness - 0.25 * green).abs() < 1e-6 && green != red, "{coat_roughness}");
+    assert!(warnings[0].contains("textures of `KHR_materials_clearcoat`"), "{warnings:?}");
     assert_eq!(specular_color, Vec3::new(2.0, 1.0, 1.0));
     // The index 0 is an infinite one, of which the factors alone are left.
     let (mirror, _) = gltf_material(&folder, &material.replace("1.4", "0"), &rest);
@@ -985,6 +1005,11 @@ fn mtl_materials_become_surfaces() {
         panic!()
     };
     assert_eq!((metallic, roughness), (1.0, 0.3));
+    let coated = kind("Kd 0.5\nPc 0.5\nPcr 0.25");
+    let MaterialKind::Principled(Principled { coat_weight, coat_roughness, .. }) = coated else {
+        panic!("{coated:?}")
+    };
+    assert_eq!((coat_weight, coat_roughness), (0.5, 0.25));
     assert_eq!(found.surface.metallic.unwrap().encoding, Encoding::Linear);
     let emission = found.surface.emission.unwrap();
     assert_eq!((emission.radiance, emission.two_sided), (Vec3::new(2.0, 1.0, 0.0), true));

@@ -389,6 +389,14 @@ fn models_become_materials() {
     assert_eq!(material(ward).1.len(), 1);
     let coated = r#"<bsdf type="coating"><bsdf type="diffuse"/></bsdf>"#;
     assert!(matches!(material(coated).0.kind, MaterialKind::Plastic { .. }));
+    let gold = coated
+        .replace("\"diffuse\"/", "\"conductor\"><string name=\"material\" value=\"Au\"/></bsdf");
+    let (MaterialKind::Principled(gold), warnings) = (material(&gold).0.kind, material(&gold).1)
+    else {
+        panic!()
+    };
+    assert_eq!((gold.metallic, gold.coat_weight, warnings.len()), (1.0, 1.0, 0));
+    assert!(gold.coat_roughness < 0.05 && gold.base_color.x > 0.5, "{gold:?}");
     let plastic = material(r#"<bsdf type="pplastic"><float name="alpha" value="0.2"/></bsdf>"#);
     let MaterialKind::Plastic { alpha: 0.2, .. } = plastic.0.kind else { panic!() };
     assert!(plastic.1.iter().any(|text| text.contains("polarisation of `pplastic`")));
@@ -416,15 +424,26 @@ fn principled_becomes_the_material_of_gltf() {
         r#"<bsdf type="principled"><rgb name="base_color" value="0.9 0.5 0.1"/>
         <float name="roughness" value="0.3"/><float name="metallic" value="0.75"/>
         <float name="specular" value="0.5"/><float name="sheen" value="0.5"/>
-        <float name="clearcoat" value="0"/><float name="spec_trans" value="0"/></bsdf>"#,
+        <float name="clearcoat" value="0.8"/><float name="clearcoat_gloss" value="0.5"/>
+        <float name="spec_trans" value="0"/></bsdf>"#,
     );
     let MaterialKind::Principled(Principled {
-        base_color, metallic, roughness, ior, specular, ..
+        base_color,
+        metallic,
+        roughness,
+        ior,
+        specular,
+        coat_weight,
+        coat_roughness,
+        ..
     }) = found.kind
     else {
         panic!()
     };
     assert_eq!((metallic, roughness), (0.75, 0.3));
+    // A quarter of the strength; α is half-way from 0.1 to 0.001.
+    assert!((coat_weight - 0.2).abs() < 1e-6, "{coat_weight}");
+    assert!((coat_roughness.powi(2) - 0.0505).abs() < 1e-6, "{coat_roughness}");
     // The quarter that is no metal is 3% lighter as a Lambertian base.
     assert_close(base_color, 1.00775 * Vec3::new(0.9, 0.5, 0.1));
     assert!((ior - 1.5).abs() < 1e-6 && specular == 1.0, "{ior}");

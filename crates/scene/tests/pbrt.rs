@@ -319,9 +319,23 @@ fn materials_are_the_nearest() {
     close(eta, [1.6, 0.8, 0.5]);
     close(k, [4.049, 3.343, 2.393]);
     assert_eq!(alpha, 1e-3);
-    // The metal below a coat has a roughness of its own.
-    let coated = r#""coatedconductor" "float conductor.roughness" 0.25"#;
-    assert!(matches!(material(coated).kind, MaterialKind::Conductor { alpha: 0.5, .. }));
+    // The metal below a coat has a roughness of its own, and reflects less than in air.
+    let coated = r#""coatedconductor" "float conductor.roughness" 0.25
+        "float interface.roughness" 0.0625 "rgb conductor.eta" [1.5 1.5 0.3] "rgb conductor.k" [0 3 3]"#;
+    let MaterialKind::Principled(metal) = material(coated).kind else { panic!() };
+    assert_eq!((metal.metallic, metal.roughness, metal.coat_weight), (1.0, 0.5_f32.sqrt(), 1.0));
+    assert_eq!(metal.coat_roughness, 0.5);
+    close(metal.base_color, [0.0, 0.5, (0.64 + 4.0) / (1.44 + 4.0)]);
+    // η = 1 and k = 2√r/√(1 − r) again, over the index of the coat; as a number and as an image.
+    let half = material(r#""coatedconductor" "rgb reflectance" [0.5 0.5 0.5]"#);
+    let MaterialKind::Principled(metal) = half.kind else { panic!() };
+    close(metal.base_color, [17.0 / 41.0; 3]);
+    let image = world(
+        r#"Texture "t" "spectrum" "checkerboard" "rgb tex1" [0.5 0.5 0.5] "rgb tex2" [0.5 0.5 0.5]
+        Material "coatedconductor" "texture reflectance" "t" Shape "sphere""#,
+    );
+    let mean = image.materials[0].surface.color.as_ref().unwrap().mean()[0];
+    assert!((mean - 17.0 / 41.0).abs() < 0.01, "{mean}");
     // η = 1 and k = 2√r/√(1 − r) reflect r at normal incidence.
     let MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { eta, k }, .. } =
         material(r#""conductor" "rgb reflectance" [0.5 1 0]"#).kind

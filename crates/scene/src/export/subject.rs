@@ -77,6 +77,13 @@ impl<'a> Subject<'a> {
         }
     }
 
+    /// Names a coat, which no other format than glTF takes.
+    pub(super) fn without_coat(&mut self, material: &Principled) {
+        if material.coat_weight > 0.0 {
+            self.warn(&format!("its coat is left out, for which {} has no place", self.program));
+        }
+    }
+
     /// Image of the GGX width, if the roughness has one.
     pub(super) fn width(&mut self, alpha: f32) -> Option<(&'a TextureUse, Recipe)> {
         let used = self.surface.roughness.as_ref()?;

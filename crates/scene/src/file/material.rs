@@ -125,6 +125,12 @@ pub(crate) struct PrincipledEntry {
     /// Factor of the dielectric's reflectance at normal incidence.
     #[serde(default = "default_factor")]
     pub specular_color: [f32; 3],
+    /// Share below a clear coat of refractive index 1.5, 0…1.
+    #[serde(default)]
+    pub coat_weight: f32,
+    /// √α of the coat, 0…1.
+    #[serde(default)]
+    pub coat_roughness: f32,
 }
 
 fn default_metallic() -> Textured<f32> {

@@ -183,6 +183,9 @@ impl Reader<'_> {
                 self.surface.metallic = texture;
                 let (roughness, texture) = self.number("roughness", &entry.roughness, SHARE)?;
                 self.surface.roughness = texture;
+                let (coat_weight, coat_roughness) = (entry.coat_weight, entry.coat_roughness);
+                self.check_range("coat_weight", &[coat_weight], SHARE)?;
+                self.check_range("coat_roughness", &[coat_roughness], SHARE)?;
                 MaterialKind::Principled(Principled {
                     base_color,
                     metallic,
@@ -190,6 +193,8 @@ impl Reader<'_> {
                     ior: entry.ior,
                     specular: entry.specular,
                     specular_color,
+                    coat_weight,
+                    coat_roughness,
                 })
             }
             MaterialKindEntry::Dielectric(entry) => {

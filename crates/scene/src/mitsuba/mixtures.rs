@@ -88,7 +88,7 @@ impl Reader {
         mixed.ok_or_else(|| node.error("mixturebsdf: expected bsdfs in it"))
     }
 
-    /// Coat of version 0.6 on another model: a plastic on a diffuse one.
+    /// Coat of version 0.6 on another model: a plastic on a diffuse one, a coated material on metal.
     pub(super) fn coating(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let mut model = self.inner(parameters)?;
         let Width { alpha, texture } = if parameters.node.kind() == "coating" {
@@ -101,6 +101,16 @@ impl Reader {
             MaterialKind::Diffuse { reflectance } if (COAT_IOR.0..=COAT_IOR.1).contains(&ior) => {
                 model.kind = MaterialKind::Plastic { diffuse: reflectance, alpha, ior };
                 model.surface.roughness = texture;
+            }
+            MaterialKind::Conductor { alpha: own, fresnel } => {
+                let coat_roughness = texture.map_or(alpha.sqrt(), |texture| texture.mean()[0]);
+                let reflectance = fresnel.at_normal_incidence();
+                let metal = Principled::coated_metal(reflectance, own, coat_roughness);
+                model.kind = MaterialKind::Principled(metal);
+            }
+            MaterialKind::Mirror { reflectance } => {
+                let metal = Principled::coated_metal(reflectance, 0.0, alpha.sqrt());
+                model.kind = MaterialKind::Principled(metal);
             }
             _ => self.ignored.add(features::MI_COATING, || parameters.node.place()),
         }

@@ -13,8 +13,7 @@ use crate::{
 };
 
 /// Parameters without a counterpart, which change nothing at 0.
-const WITHOUT_COUNTERPART: [&str; 5] =
-    ["anisotropic", "spec_tint", "sheen", "flatness", "clearcoat"];
+const WITHOUT_COUNTERPART: [&str; 4] = ["anisotropic", "spec_tint", "sheen", "flatness"];
 
 impl Reader {
     /// Names parameters that are left out, where they are not 0.
@@ -38,11 +37,15 @@ impl Reader {
         let mut number =
             |name: &str, default: f32| self.value_or(parameters, name, Role::Index, default);
         let (roughness, metallic) = (number("roughness", 0.5)?, number("metallic", 0.0)?);
-        let spec_trans = number("spec_trans", 0.0)?;
+        let (spec_trans, coat) = (number("spec_trans", 0.0)?, number("clearcoat", 0.0)?);
+        // Mitsuba's coat has a quarter of the strength that it states, and an α of 0.1 to 0.001.
+        let coat_weight = 0.25 * luminance(coat.mean()).clamp(0.0, 1.0);
+        let gloss = luminance(number("clearcoat_gloss", 0.0)?.mean()).clamp(0.0, 1.0);
+        let coat_roughness = (0.1 - gloss * (0.1 - MIN_ALPHA)).sqrt();
         self.without_counterpart(parameters, &WITHOUT_COUNTERPART)?;
         parameters.without_effect(
-            "sheen_tint clearcoat_gloss diffuse_reflectance_sampling_rate \
-             main_specular_sampling_rate clearcoat_sampling_rate",
+            "sheen_tint diffuse_reflectance_sampling_rate main_specular_sampling_rate \
+             clearcoat_sampling_rate",
         );
         let base = self.value_or(parameters, "base_color", Role::Reflectance, 0.5)?;
         let ior = match (parameters.float_in("eta", (1.0, 4.0))?, parameters.float("specular")?) {
@@ -92,6 +95,8 @@ impl Reader {
                 roughness: roughness.x.clamp(0.0, 1.0),
                 ior,
                 specular,
+                coat_weight,
+                coat_roughness,
                 ..Principled::default()
             })
         });

@@ -14,7 +14,7 @@ use crate::{
     error::Result,
     features,
     import::{SOLID_IOR, Value, Width, blend::mixed, media, relief::Reliefs, sheet},
-    material::{ConductorFresnel, Material, MaterialKind, Surface},
+    material::{ConductorFresnel, Material, MaterialKind, Principled, Surface},
     measured::MeasuredFiles,
 };
 
@@ -84,13 +84,8 @@ impl<'a> Materials<'a> {
             }
             "conductor" => self.conductor(entity, "", &mut surface)?,
             "coatedconductor" => {
-                self.textures.log.ignore(features::PBRT_COATED_CONDUCTOR, &entity.place);
                 self.layers(entity)?;
-                entity.without_effect(
-                    "interface.roughness interface.uroughness interface.vroughness \
-                     interface.eta",
-                );
-                self.conductor(entity, "conductor.", &mut surface)?
+                self.coated_conductor(entity, &mut surface)?
             }
             "dielectric" => {
                 let roughness = self.roughness(entity, "")?;
@@ -223,11 +218,8 @@ impl<'a> Materials<'a> {
             {
                 return Ok(MaterialKind::Mirror { reflectance: Vec3::ONE });
             }
-            // pbrt takes η = 1 and the k that reflects as much.
             Some(Value::Constant(color)) => {
-                let color = color.clamp(Vec3::ZERO, Vec3::splat(0.9999));
-                let k = color.map(f32::sqrt) / (Vec3::ONE - color).map(f32::sqrt);
-                ConductorFresnel::Exact { eta: Vec3::ONE, k: 2.0 * k }
+                ConductorFresnel::Exact { eta: Vec3::ONE, k: index_of_metal(color) }
             }
             None => {
                 let index = |name: &str| match entity.find_of(&own(name), &spectra::KINDS)? {
@@ -243,6 +235,31 @@ impl<'a> Materials<'a> {
             }
         };
         Ok(MaterialKind::Conductor { alpha: roughness.alpha, fresnel })
+    }
+
+    /// Metal below a coat, seen from inside of which it reflects less than from the air.
+    fn coated_conductor(&mut self, entity: &Entity, surface: &mut Surface) -> Result<MaterialKind> {
+        let ior = self.ior(entity, "interface.eta", (SOLID_IOR.0, COAT_IOR.1))?;
+        if (ior - 1.5).abs() > 0.01 {
+            self.textures.log.ignore(features::PBRT_COAT_INDEX, &entity.place);
+        }
+        let coat = self.roughness(entity, "interface.")?;
+        let coat_roughness = coat.texture.map_or(coat.alpha.sqrt(), |texture| texture.mean()[0]);
+        let below = |eta: Vec3, k: Vec3| {
+            ConductorFresnel::Exact { eta: eta / ior, k: k / ior }.at_normal_incidence()
+        };
+        let (reflectance, alpha) = match self.conductor(entity, "conductor.", surface)? {
+            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
+                (below(eta, k), alpha)
+            }
+            MaterialKind::Conductor { alpha, .. } => (Vec3::ONE, alpha),
+            _ => (Vec3::ONE, 0.0),
+        };
+        surface.color = surface.color.take().map(|texture| {
+            texture.mapped(|share| below(Vec3::ONE, index_of_metal(Vec3::splat(share))).x)
+        });
+        let metal = Principled::coated_metal(reflectance, alpha, coat_roughness);
+        Ok(MaterialKind::Principled(metal))
     }
 
     /// Refractive index, a number or the mean of a spectrum.
@@ -346,6 +363,12 @@ pub(super) fn set_opacity(surface: &mut Surface, value: Value) {
         Value::Constant(opacity) => surface.opacity.factor = opacity.x.clamp(0.0, 1.0),
         Value::Image(image) => surface.opacity.texture = Some(image),
     }
+}
+
+/// Extinction coefficient of a metal of refractive index η = 1 and this reflectance, which pbrt takes for it.
+fn index_of_metal(reflectance: Vec3) -> Vec3 {
+    let color = reflectance.clamp(Vec3::ZERO, Vec3::splat(0.9999));
+    2.0 * color.map(f32::sqrt) / (Vec3::ONE - color).map(f32::sqrt)
 }
 
 /// Returns the constant colour of a model, 1 if a texture gives it.

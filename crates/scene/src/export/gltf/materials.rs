@@ -122,6 +122,12 @@ impl<'a> Translator<'a> {
             }
             &MaterialKind::Principled(own) => {
                 self.dielectric(own.ior, own.specular, own.specular_color);
+                if own.coat_weight > 0.0 {
+                    let (weight, roughness) = (own.coat_weight, own.coat_roughness);
+                    let coat =
+                        json!({"clearcoatFactor": weight, "clearcoatRoughnessFactor": roughness});
+                    self.extension("KHR_materials_clearcoat", coat);
+                }
                 own
             }
             MaterialKind::Mirror { reflectance } => {

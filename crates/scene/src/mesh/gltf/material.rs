@@ -192,6 +192,7 @@ impl GltfReader<'_> {
         } else {
             self.transmission(&mut reading, &mut reflection, is_glass)?;
             self.diffuse_transmission(&mut reading, &mut reflection)?;
+            self.coat(&mut reading, &mut reflection)?;
             let normal = &json["normalTexture"];
             reflection.surface.normal = self.texture(normal, VECTOR, &mut reading)?;
             reflection.surface.normal_scale = number(normal, "scale", 1.0);
@@ -234,6 +235,7 @@ impl GltfReader<'_> {
             ior,
             specular: share(specular, "specularFactor", 1.0),
             specular_color: whole * specular_color.max(Vec3::ZERO),
+            ..Principled::default()
         });
         reading.ignore_if(has_textures, features::GLTF_SPECULAR_TEXTURE);
         let packed = &pbr["metallicRoughnessTexture"];
@@ -406,6 +408,32 @@ impl GltfReader<'_> {
         found.surface.color = image;
         found.surface.roughness = None;
         found.surface.metallic = None;
+        Ok(())
+    }
+
+    /// Covers a metallic-roughness material by `KHR_materials_clearcoat`.
+    fn coat(&mut self, reading: &mut Reading, found: &mut Reflection) -> Result<()> {
+        let json = reading.json;
+        let coat = &json["extensions"]["KHR_materials_clearcoat"];
+        let mut is_alike = json["normalTexture"] == coat["clearcoatNormalTexture"];
+        let mut mean = |key: &str, channels, reading: &mut Reading| {
+            let texture = self.texture(&coat[key], channels, reading)?;
+            is_alike &= texture.is_none();
+            Ok(texture.map_or(1.0, |texture| texture.mean()[0]))
+        };
+        let weight = share(coat, "clearcoatFactor", 0.0) * mean("clearcoatTexture", RED, reading)?;
+        let roughness = share(coat, "clearcoatRoughnessFactor", 0.0)
+            * mean("clearcoatRoughnessTexture", GREEN, reading)?;
+        if weight == 0.0 {
+            return Ok(());
+        }
+        match &mut found.kind {
+            MaterialKind::Principled(own) => {
+                (own.coat_weight, own.coat_roughness) = (weight, roughness);
+                reading.ignore_if(!is_alike, features::GLTF_CLEARCOAT_TEXTURE);
+            }
+            _ => reading.ignore(features::GLTF_CLEARCOAT),
+        }
         Ok(())
     }
 

@@ -61,6 +61,8 @@ pub(super) struct LibraryMaterial {
     emission: Option<Vec3>,
     roughness: Option<f32>,
     metallic: Option<f32>,
+    coat_weight: Option<f32>,
+    coat_roughness: Option<f32>,
     color_map: Option<Map>,
     opacity_map: Option<Map>,
     emission_map: Option<Map>,
@@ -145,9 +147,11 @@ impl<'a> Library<'a> {
             "pr" if share.is_some() => entry.roughness = share,
             "pm" if share.is_some() => entry.metallic = share,
             "ka" if color == Some(Vec3::ZERO) => {}
-            // A coat, a sheen or an anisotropy of strength 0 changes nothing.
-            "pc" | "ps" | "aniso" if share == Some(0.0) => {}
-            "pcr" | "anisor" => {}
+            "pc" if share.is_some() => entry.coat_weight = share,
+            "pcr" if share.is_some() => entry.coat_roughness = share,
+            // A sheen or an anisotropy of strength 0 changes nothing.
+            "ps" | "aniso" if share == Some(0.0) => {}
+            "anisor" => {}
             "ka" => entry.ignore(features::MTL_KA, features::MTL_KA.name),
             "map_kd" => entry.color_map = map(entry),
             "map_d" => entry.opacity_map = map(entry),

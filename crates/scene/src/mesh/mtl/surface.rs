@@ -98,6 +98,8 @@ impl LibraryMaterial {
                 metallic: self.metallic.unwrap_or(one_if(surface.metallic.is_some(), 0.0)),
                 roughness: self.roughness.unwrap_or(roughness),
                 ior,
+                coat_weight: self.coat_weight.unwrap_or(0.0),
+                coat_roughness: self.coat_roughness.unwrap_or(0.0),
                 ..Principled::default()
             })
         } else if is_pane {
@@ -136,6 +138,7 @@ impl LibraryMaterial {
     fn is_metallic_roughness(&self) -> bool {
         self.roughness.is_some()
             || self.metallic.is_some()
+            || self.coat_weight.is_some_and(|weight| weight > 0.0)
             || self.roughness_map.is_some()
             || self.metallic_map.is_some()
     }
