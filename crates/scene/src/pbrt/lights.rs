@@ -253,7 +253,8 @@ fn enlarge(texels: Vec<Vec3>, side: u32, wanted: u32) -> Vec<Vec3> {
     rows.map(|(row, column)| texels[at(row) * side as usize + at(column)]).collect()
 }
 
-/// Illuminance of a plane that faces +z of a square equal-area map.
+/// Illuminance of a plane that faces +z of a square equal-area map, as pbrt sums it: with 2π/N for the solid
+/// angle of each of N texels, which is 4π/N, so that a light that states its illuminance has twice of that.
 fn upper_illuminance(texels: &[Vec3], side: u32) -> f64 {
     let sum: f64 = (0..texels.len())
         .map(|index| {
@@ -266,5 +267,5 @@ fn upper_illuminance(texels: &[Vec3], side: u32) -> f64 {
             cosine * f64::from(luminance(texels[index as usize]))
         })
         .sum();
-    4.0 * PI * sum / texels.len() as f64
+    2.0 * PI * sum / texels.len() as f64
 }
