@@ -55,19 +55,8 @@ fn glass(transmittance: Vec3) -> MaterialKind {
 fn sheltered_plane(sheet: Material, environment: fenestra::scene::EnvironmentMap) -> Scene {
     let mut scene = scenes::plane(Vec3::splat(0.5), environment);
     scene.materials.push(sheet);
-    add_square(&mut scene.geometry, Vec3::new(0.0, 8.0, 0.0), 5e3, 1);
+    scenes::add_square(&mut scene.geometry, Vec3::new(0.0, 8.0, 0.0), 5e3, 1);
     scene
-}
-
-/// Adds a horizontal square, seen from above, with half edges of `half`.
-fn add_square(geometry: &mut Geometry, centre: Vec3, half: f32, material: u32) {
-    let first = geometry.positions.len() as u32;
-    for [x, z] in [[-half, -half], [-half, half], [half, half], [half, -half]] {
-        geometry.positions.push((centre + Vec3::new(x, 0.0, z)).into());
-        geometry.normals.push([0.0; 3]);
-    }
-    geometry.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
-    geometry.materials.extend([material; 2]);
 }
 
 /// A square at y = 0 that fills the image, seen along about 70° from its normal, between a sky and a ground
@@ -77,7 +66,7 @@ fn between_sky_and_ground(surface: MaterialKind) -> Scene {
     let mut scene = scenes::plane(Vec3::ZERO, environment);
     scene.materials = vec![Material::new("surface", surface)];
     scene.geometry = Geometry::default();
-    add_square(&mut scene.geometry, Vec3::ZERO, 5.0, 0);
+    scenes::add_square(&mut scene.geometry, Vec3::ZERO, 5.0, 0);
     scene.camera.position = Vec3::new(0.0, 3.0, 8.0);
     scene.camera.vertical_fov_deg = 4.0;
     scene
@@ -148,6 +137,27 @@ fn a_glowing_box_fills_itself_with_light() {
     let mean = mean(&scene, settings(Sampler::Mis, 3));
     // Rounding lets a point of the same wall shine at a grazing angle.
     assert!(mean < 1e-6, "{mean}");
+}
+
+/// A sphere that glows inside, white above and black below: from everywhere a path meets either by the same
+/// chance, as long as each bounce draws numbers of its own.
+#[test]
+fn bounces_in_a_sphere_forget_where_they_come_from() {
+    let _alone = support::alone();
+    let emission = Emission { radiance: Vec3::ONE, texture: None, two_sided: true };
+    let mut scene = scenes::convex_furnace(scenes::diffuse(Vec3::ONE), Vec3::ZERO);
+    scene.materials.push(scenes::diffuse(Vec3::ZERO));
+    for material in &mut scene.materials {
+        material.surface.emission = Some(emission.clone());
+    }
+    scene.name = "glowing sphere".into();
+    scene.geometry = Geometry::default();
+    scenes::add_sphere(&mut scene.geometry, Vec3::ZERO, 1.0, 12, 0);
+    let half = scene.geometry.materials.len() / 2;
+    scene.geometry.materials[half..].fill(1);
+    (scene.camera.position, scene.camera.look_at) =
+        (Vec3::new(0.1, 0.2, 0.3), Vec3::new(0.5, 1.0, 0.4));
+    assert_mean(&scene, settings(Sampler::Mis, 3), 8, 2.0 + 0.5 + 0.25);
 }
 
 #[test]
@@ -237,36 +247,12 @@ fn lamps_of_unlike_power_add_up() {
         scenes::add_lamp(&mut scene, LampKind::Directional { direction: Vec3::NEG_Y, irradiance });
     }
     assert_mean(&scene, settings(Sampler::Mis, 1), 128, 4.0 * 0.5 / f64::from(PI));
-}
-
-#[test]
-fn an_area_lamp_agrees_with_a_point_far_away() {
-    let _alone = support::alone();
-    // A square of 0.2 m, 4 m above: I = L·A along its axis, to 0.2%.
-    let mut scene = scenes::plane(Vec3::splat(0.5), black());
-    scene.camera.vertical_fov_deg = 2.0;
-    let emission = Emission { radiance: Vec3::splat(900.0), texture: None, two_sided: false };
-    let mut lamp = scenes::diffuse(Vec3::ZERO);
-    lamp.surface.emission = Some(emission);
-    scene.materials.push(lamp);
-    // The camera stands at x = 0 below the lamp's height; the lamp is beside its view and shines downward.
-    add_square(&mut scene.geometry, Vec3::new(0.5, 4.0, 0.0), 0.1, 1);
-    scene.geometry.triangles.iter_mut().skip(12).for_each(|corners| corners.swap(1, 2));
-    let expected = mean_over_plane(&scene, |place| {
-        let cells = 20;
-        (0..cells * cells)
-            .map(|cell| {
-                let at = |index: i32| 0.2 * ((index as f32 + 0.5) / cells as f32 - 0.5);
-                let point = Vec3::new(0.5 + at(cell % cells), 4.0, at(cell / cells));
-                let to_lamp = point - place;
-                let cosine = to_lamp.normalize().y;
-                900.0 * 0.04 * cosine * cosine / to_lamp.length_squared() * 0.5 / PI
-            })
-            .sum::<f32>()
-            / (cells * cells) as f32
-    });
-    assert_mean(&scene, settings(Sampler::Mis, 1), 16, expected);
-    assert_mean(&scene, settings(Sampler::Guided, 1), 16, expected);
+    // More lamps than candidates, so that the number that draws one of them tells its colour.
+    scene.lamps.clear();
+    for irradiance in [Vec3::X, 0.2972 * Vec3::Y].repeat(8) {
+        scenes::add_lamp(&mut scene, LampKind::Directional { direction: Vec3::NEG_Y, irradiance });
+    }
+    assert_mean(&scene, settings(Sampler::Mis, 1), 64, 8.0 * 0.5 / f64::from(PI));
 }
 
 #[test]
@@ -402,7 +388,7 @@ fn slabs_absorb_along_the_way() {
     let mut scene = between_sky_and_ground(glass);
     scene.environment = scenes::environment(16, |_| Vec3::ONE);
     let thickness = 0.3;
-    add_square(&mut scene.geometry, Vec3::new(0.0, -thickness, 0.0), 5.0, 0);
+    scenes::add_square(&mut scene.geometry, Vec3::new(0.0, -thickness, 0.0), 5.0, 0);
     scene.geometry.triangles[2..].iter_mut().for_each(|triangle| triangle.swap(1, 2));
     let length = |cosine: f64| f64::from(thickness) / (1.0 - (1.0 - cosine * cosine) / 2.25).sqrt();
     assert_channels_at("slab", &scene, 20, 1024, 0.01, |cosine| {
@@ -413,9 +399,10 @@ fn slabs_absorb_along_the_way() {
     });
 }
 
-/// A bent normal would have the mirror reflect what lies below it.
+/// A bent normal would have a mirror reflect what lies below it, and a sheet be lit from there by shadow
+/// rays, by bounces and by a lamp.
 #[test]
-fn bent_normals_let_no_light_through_a_mirror() {
+fn bent_normals_let_no_light_through() {
     let _alone = support::alone();
     let mut scene = between_sky_and_ground(MaterialKind::Mirror { reflectance: Vec3::ONE });
     assert_channels("flat", &scene, 1, 1e-4, |_| SKY.as_dvec3());
@@ -423,6 +410,12 @@ fn bent_normals_let_no_light_through_a_mirror() {
     let (sine, cosine) = 15_f32.to_radians().sin_cos();
     scene.geometry.normals.fill([0.0, cosine, -sine]);
     assert_channels("bent", &scene, 1, 1e-4, |_| DVec3::ZERO);
+    scene.materials[0] = scenes::diffuse(Vec3::ONE);
+    scene.geometry.normals.fill([0.64, 0.77, 0.0]);
+    scene.environment = scenes::environment(64, |to| if to.y > -0.2 { SKY } else { GROUND });
+    scenes::add_point(&mut scene, Vec3::new(6.0, -2.0, 0.0), Vec3::Y);
+    let mean = film_mean(&support::render(&scene, settings(Sampler::Mis, 2), 16).0);
+    assert!(mean.y == 0.0 && mean.x > 0.1, "{mean}");
 }
 
 /// Light leaves a lamp by its triangles, whatever normals are interpolated over them.
@@ -442,22 +435,67 @@ fn the_normals_of_a_lamp_do_not_matter() {
     assert!(round.sum.iter().any(|sum| sum[0] > 0.0));
 }
 
-/// A glowing square whose second coordinates lie on the green texel, and the first on the red one.
+/// A glowing square whose second coordinates lie on the green texel, and the first on the red one. Then one
+/// that lights the floor beside it, red on one side and green on the other, and with a hole in half of both.
 #[test]
 fn emission_takes_the_coordinates_that_its_texture_names() {
     let _alone = support::alone();
-    let texels = Texels::Bytes(vec![[255, 0, 0, 255], [0, 255, 0, 255]]);
-    let texture = Texture { name: "lamp".into(), width: 2, height: 1, texels };
-    let used = TextureUse {
-        uv_set: 1,
+    let used = |uv_set, texels: [[u8; 4]; 2]| TextureUse {
+        uv_set,
         interpolation: Interpolation::Nearest,
-        ..TextureUse::new(Arc::new(texture))
+        ..TextureUse::new(Arc::new(Texture {
+            name: "lamp".into(),
+            width: 2,
+            height: 1,
+            texels: Texels::Bytes(texels.to_vec()),
+        }))
     };
+    let texture = Some(used(1, [[255, 0, 0, 255], [0, 255, 0, 255]]));
     let mut scene = between_sky_and_ground(MaterialKind::Diffuse { reflectance: Vec3::ZERO });
-    let emission = Emission { radiance: Vec3::ONE, texture: Some(used), two_sided: false };
+    let emission = Emission { radiance: Vec3::ONE, texture, two_sided: false };
     scene.materials[0].surface.emission = Some(emission);
     scene.geometry.uvs = [0.25, 0.75].map(|u| vec![[u, 0.5]; 4]);
     assert_channels("green", &scene, 1, 1e-4, |_| DVec3::Y);
+
+    let mut lamp = scene.materials.remove(0);
+    lamp.surface.opacity.texture = Some(used(0, [[0, 0, 0, 255], [255; 4]]));
+    let mut scene = scenes::plane(Vec3::splat(0.5), black());
+    scene.camera.vertical_fov_deg = 0.1;
+    scene.materials.push(lamp);
+    scenes::add_square(&mut scene.geometry, Vec3::new(0.9, 0.8, 0.3), 0.6, 1);
+    // It shines downward. A corner more: its three triangles are drawn by unlike chances.
+    let first = scene.geometry.positions.len() as u32 - 4;
+    scene.geometry.positions.push([0.3, 0.8, 0.6]);
+    scene.geometry.normals.push([0.0; 3]);
+    let fan = [[0, 3, 4], [4, 2, 1], [4, 3, 2]].map(|corners| corners.map(|corner| first + corner));
+    scene.geometry.triangles.splice(12.., fan);
+    scene.geometry.materials.push(1);
+    // The first coordinates go along z, the second ones along x.
+    let along = |axis: usize, first: f32| {
+        let at = |place: &[f32; 3]| [(place[axis] - first) / 1.2, 0.5];
+        scene.geometry.positions.iter().map(at).collect()
+    };
+    scene.geometry.uvs = [along(2, -0.3), along(0, 0.3)];
+    let cells = 200;
+    let expected = [0.3, 0.9].map(|first| {
+        let cell = |index: i32| {
+            let at = |step: i32| 0.6 * (f64::from(step) + 0.5) / f64::from(cells);
+            let to_lamp = DVec3::new(first + at(index % cells), 0.8, at(index / cells) + 0.3);
+            let cosine = to_lamp.normalize().y;
+            cosine * cosine / to_lamp.length_squared()
+        };
+        let sum: f64 = (0..cells * cells).map(cell).sum();
+        sum * (0.6 / f64::from(cells)).powi(2) * 0.5 / f64::from(PI)
+    });
+    for sampler in [Sampler::Mis, Sampler::Guided] {
+        let [mean, error] = mean_and_error(&scene, &settings(sampler, 1), 32, 8);
+        eprintln!("{}: {mean:.5} ± {error:.5}, expected {expected:.5?}", sampler.name());
+        for (channel, expected) in expected.into_iter().enumerate() {
+            assert!(error[channel] < 0.01 * expected, "too noisy to judge");
+            let off = (mean[channel] - expected).abs();
+            assert!(off < 6.0 * error[channel] + 1e-3 * expected, "{mean}, not {expected}");
+        }
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 //! The reference is `mis` without sharing; 21 comparisons raise a false alarm once in about 950 runs.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use fenestra::{
     film::Window,
@@ -157,6 +157,34 @@ fn wall(bend_deg: f32) -> Scene {
     }
     scene.name = format!("wall bent by {bend_deg}°");
     scene
+}
+
+/// A sheet that leans by its normals toward a lit wall below it, which paths of other pixels find, stays
+/// dark; and through a red pane before the camera all is red.
+#[test]
+fn nothing_is_shared_from_below_the_horizon_or_past_the_colour_of_a_pane() {
+    let _alone = support::alone();
+    let mut scene = scenes::plane(Vec3::splat(0.7), scenes::environment(16, |_| Vec3::ZERO));
+    scene.geometry.positions.iter_mut().for_each(|position| position[1] -= 1.0);
+    let size = Vec3::new(0.1, 0.9, 4.0);
+    scenes::add_box(&mut scene.geometry, Vec3::new(-0.5, -0.55, 0.0), size, 0);
+    let first = scene.geometry.positions.len();
+    // Columns 12 to 15 of the film, in a block with columns that see the floor.
+    scenes::add_square(&mut scene.geometry, Vec3::new(11.35, 0.0, 0.0), 10.0, 0);
+    scene.geometry.normals[first..].fill([-0.64, 0.77, 0.0]);
+    scenes::add_point(&mut scene, Vec3::new(0.3, -0.5, 0.0), Vec3::splat(20.0));
+    let red =
+        MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: Vec3::X };
+    scene.materials.push(Material::new("red", red));
+    scenes::add_box(&mut scene.geometry, scene.camera.position, Vec3::splat(0.1), 1);
+    let picture = render(&scene, settings(Sampler::Mis, "8", 2), &[8]).sum;
+    let brightest = |columns: Range<usize>, channel: usize| {
+        let pixels = (0..picture.len()).filter(|pixel| columns.contains(&(pixel % 16)));
+        pixels.map(|pixel| picture[pixel][channel]).fold(0.0, f32::max)
+    };
+    let [floor, sheet, green] =
+        [(8..12, 0), (13..16, 0), (0..16, 1)].map(|(at, of)| brightest(at, of));
+    assert!(floor > 1.0 && sheet == 0.0 && green == 0.0, "{floor} {sheet} {green}");
 }
 
 /// A white surface whose values come from a table shares light by direction, and is nearly as white.

@@ -89,6 +89,17 @@ pub fn add_box(geometry: &mut Geometry, centre: Vec3, size: Vec3, material: u32)
     }
 }
 
+/// Adds a horizontal square, seen from above, with half edges of `half`.
+pub fn add_square(geometry: &mut Geometry, centre: Vec3, half: f32, material: u32) {
+    let first = geometry.positions.len() as u32;
+    for [x, z] in [[-half, -half], [-half, half], [half, half], [half, -half]] {
+        geometry.positions.push((centre + Vec3::new(x, 0.0, z)).into());
+        geometry.normals.push([0.0; 3]);
+    }
+    geometry.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    geometry.materials.extend([material; 2]);
+}
+
 /// Adds a sphere of `rings` × 2 `rings` quads with smooth normals.
 pub fn add_sphere(geometry: &mut Geometry, centre: Vec3, radius: f32, rings: u32, material: u32) {
     let first = u32::try_from(geometry.positions.len()).unwrap_or(u32::MAX);
