@@ -349,6 +349,28 @@ fn techniques_are_weighed_by_the_rays_they_have() {
     }
 }
 
+/// Light from one side alone: where the number that chooses a lobe chose its directions too, each lobe would
+/// leave out a part of the sky.
+#[test]
+fn lobes_are_chosen_by_a_number_of_their_own() {
+    let _alone = support::alone();
+    let side = Vec3::new(0.6, 0.0, 0.8);
+    let sky = scenes::environment(32, |to| Vec3::splat(if to.dot(side) > 0.0 { 2.0 } else { 0.1 }));
+    let mut scene = scenes::plane(Vec3::ONE, sky);
+    scene.materials = vec![scenes::plastic(0.3)];
+    scene.camera.position = Vec3::new(4.0, 5.0, 3.0);
+    let mean = |sampler| {
+        let settings = Settings { sampler, ..Settings::default() };
+        mean_and_error(&scene, &settings, 16, 12)
+    };
+    let [expected, expected_error] = mean(Sampler::Cosine);
+    for sampler in [Sampler::Brdf, Sampler::Mis] {
+        let [mean, error] = mean(sampler);
+        let error = (error * error + expected_error * expected_error).map(f64::sqrt);
+        assert_mean(sampler.name(), [mean, error], expected, 1e-4, 4e-3);
+    }
+}
+
 #[test]
 fn a_concave_white_body_vanishes_in_the_furnace() {
     let _alone = support::alone();

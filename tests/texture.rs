@@ -582,7 +582,8 @@ fn shader_agrees_with_its_twins_for_some_attributes() {
 }
 
 /// A texture of one value is a factor of its property: of the colour, of the root of the width, of the share
-/// of metal. The paths are those of a scene without textures, whose materials have the products.
+/// of metal; and no surface reflects more than all light. The paths are those of a scene without textures,
+/// whose materials have the products.
 #[test]
 fn textures_of_one_value_are_factors() {
     let _alone = support::alone();
@@ -590,7 +591,7 @@ fn textures_of_one_value_are_factors() {
         alpha,
         fresnel: ConductorFresnel::Schlick { reflectance },
     };
-    let (full, half) = (vec3(0.8, 0.6, 0.4), vec3(0.4, 0.15, 0.4));
+    let (full, half) = (vec3(0.8, 0.6, 0.4), vec3(0.4, 0.15, 1.0));
     let of = |kind| Material::new("m", kind);
     let plain = vec![
         of(MaterialKind::Diffuse { reflectance: half }),
@@ -610,7 +611,7 @@ fn textures_of_one_value_are_factors() {
         of(materials::principled(full, 0.8, 0.5)),
     ];
     for material in &mut textured {
-        material.surface.color = used([0.5, 0.25, 1.0]);
+        material.surface.color = used([0.5, 0.25, 4.0]);
         material.surface.roughness = used([0.5; 3]);
         material.surface.metallic = used([0.25; 3]);
     }
