@@ -26,7 +26,7 @@ use crate::{
     },
     sampler::{Parameters, basic::Basic},
     shader::{
-        bindings::{FILM, film},
+        bindings::{FILM, film, wave},
         constants::NO_MATERIAL,
         structs::{Counters, Hit, Ray, ShadowRay, Wave},
     },
@@ -154,8 +154,6 @@ struct Bench<'a> {
     scene: &'a SceneBuffers,
     waves: WaveBuffers,
     film_set: DescriptorSet,
-    /// Bound to the set of the film.
-    _counters: Buffer,
     wave: Wave,
 }
 
@@ -164,7 +162,7 @@ impl<'a> Bench<'a> {
         let (paths, rays, demand) = (plan.paths, plan.shadow_rays, PathDemand::default());
         let waves = WaveBuffers::new(device, paths, paths, rays, demand, scene.surfaces)?;
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64)?;
-        let film_set = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &counters)])?;
+        let film_set = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, counters)])?;
         let wave = Wave {
             pixel_count: paths.min(waves.capacity),
             sample_count: 1,
@@ -172,13 +170,12 @@ impl<'a> Bench<'a> {
             total_shadow_rays: rays,
             ..Wave::default()
         };
-        Ok(Self { device, scene, waves, film_set, _counters: counters, wave })
+        Ok(Self { device, scene, waves, film_set, wave })
     }
 
     /// Runs one pass; seconds of the device, and of the host where it traces.
     fn run(&self, pass: &Pass) -> Result<f64> {
-        let tracer = self.scene.geometry.host_tracer();
-        let host = tracer.map(|tracer| (tracer, &self.waves.answers, &self.scene.parameter_buffer));
+        let host = self.scene.geometry.host_tracer();
         let mut recording = Recording::begin(self.device, 1, host, false)?;
         let sets = [&self.scene.set, &self.waves.set, &self.film_set];
         recording.add(pass, &sets, &self.wave)?;
@@ -191,7 +188,8 @@ impl<'a> Bench<'a> {
 
     /// Downloads the rays that `trace` would follow.
     fn active_rays(&self) -> Result<Vec<Option<CpuRay>>> {
-        let rays: Vec<Ray> = self.waves.answers.rays.download(self.wave.pixel_count as usize)?;
+        let rays: Vec<Ray> =
+            self.waves.set.buffer(wave::RAYS).download(self.wave.pixel_count as usize)?;
         let cpu_ray = |ray: &Ray| CpuRay::new_inf(ray.origin.into(), ray.direction.into());
         Ok(rays.iter().map(|ray| (ray.is_active != 0).then(|| cpu_ray(ray))).collect())
     }
@@ -199,9 +197,10 @@ impl<'a> Bench<'a> {
     /// Downloads the rays that `shadow` would follow.
     fn active_shadow_rays(&self, accel: &Accel) -> Result<Vec<Option<CpuRay>>> {
         let paths = self.wave.pixel_count as usize;
-        let hits: Vec<Hit> = self.waves.answers.hits.download(paths)?;
+        let hits: Vec<Hit> = self.waves.set.buffer(wave::HITS).download(paths)?;
         let count = paths * self.wave.shadow_ray_count as usize;
-        let shadow_rays: Vec<ShadowRay> = self.waves.answers.shadow_rays.download(count)?;
+        let shadow_rays: Vec<ShadowRay> =
+            self.waves.set.buffer(wave::SHADOW_RAYS).download(count)?;
         Ok(shadow_rays
             .iter()
             .zip(hits.iter().cycle())
@@ -221,10 +220,10 @@ impl<'a> Bench<'a> {
     /// Tests for each of `count` rays whether it met a surface, after `trace` or, for any hit, `shadow`.
     fn met(&self, any_hit: bool, count: usize) -> Result<Vec<bool>> {
         if any_hit {
-            let visibility: Vec<u32> = self.waves.answers.visibility.download(count)?;
+            let visibility: Vec<u32> = self.waves.set.buffer(wave::VISIBILITY).download(count)?;
             return Ok(visibility.iter().map(|visible| *visible == 0).collect());
         }
-        let hits: Vec<Hit> = self.waves.answers.hits.download(count)?;
+        let hits: Vec<Hit> = self.waves.set.buffer(wave::HITS).download(count)?;
         Ok(hits.iter().map(|hit| hit.material != NO_MATERIAL).collect())
     }
 }

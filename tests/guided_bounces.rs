@@ -22,6 +22,7 @@ use fenestra::{
     scene::Scene,
     session::{Settings, window_of},
     shader::{
+        bindings::wave,
         constants::CONSTANT_MATERIAL_KINDS,
         rooms::guided::CONSTANT_BOUNCE_CANDIDATES,
         spirv,
@@ -140,7 +141,7 @@ fn bounce(
     let input = PathInput::new(0, floor.normal, floor.outgoing);
     PathInput::put(&vec![input; paths as usize], &waves);
     let states = vec![PathState { throughput: [1.0; 3], ..PathState::default() }; paths as usize];
-    waves.answers.paths.upload(bytemuck::cast_slice(&states)).unwrap();
+    waves.set.buffer(wave::PATHS).upload(bytemuck::cast_slice(&states)).unwrap();
 
     let kinds = (CONSTANT_MATERIAL_KINDS, buffers.surfaces.material_kinds);
     let create = |name: &str, constants: &[(u32, u32)]| {
@@ -166,8 +167,8 @@ fn bounce(
     commands.dispatch(&bounce, &sets, push, paths);
     commands.dispatch(&learn, &sets, push, paths);
     commands.submit_and_wait().unwrap();
-    let rays: Vec<Ray> = waves.answers.rays.download(paths as usize).unwrap();
-    let states: Vec<PathState> = waves.answers.paths.download(paths as usize).unwrap();
+    let rays: Vec<Ray> = waves.set.buffer(wave::RAYS).download(paths as usize).unwrap();
+    let states: Vec<PathState> = waves.set.buffer(wave::PATHS).download(paths as usize).unwrap();
     // Sixteen samples teach, then one in four, each by the direction of its ray.
     let mut untaught = [0_i64; ARRIVAL_DIRECTIONS];
     for (path, ray) in (0_u32..).zip(&rays) {

@@ -11,19 +11,19 @@ use std::f64::consts::PI;
 use bytemuck::{Pod, Zeroable};
 use fenestra::{
     brdf::MaterialTables,
-    gpu::Commands,
+    gpu::{Commands, DescriptorSet},
     math::{equal_area::direction_from_square, frame::frame_from_normal, octahedron},
     pass::{Kernel, Pass, SceneBuffers, Steps, Surfaces, WaveBuffers},
     sampler::{
         Parameters, Sampler,
         haar::{
-            HaarSteps, NodeBuffers, NodeSize,
+            HaarSteps, NodeSize,
             tree::{Tree, node_centre, place_in_square},
         },
     },
     session::{Settings, window_of},
     shader::{
-        rooms::haar::{CONSTANT_HAAR_DEPTH, CONSTANT_HAAR_LEVEL},
+        rooms::haar::{CONSTANT_HAAR_DEPTH, CONSTANT_HAAR_LEVEL, HAAR_NODES},
         rooms::product::{CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_SHARE},
         structs::Wave,
     },
@@ -111,7 +111,7 @@ struct Paths {
     tables: MaterialTables,
     tree: Tree,
     scene: SceneBuffers,
-    nodes: NodeBuffers,
+    nodes: DescriptorSet,
     waves: WaveBuffers,
     steps: HaarSteps,
     wave: Wave,
@@ -129,7 +129,7 @@ impl Paths {
         let waves =
             WaveBuffers::new(device, 64, 1 << 17, 1, size.demand(), Surfaces::default()).unwrap();
         let steps = HaarSteps::new(&parameters, tree.depth, buffers.surfaces, SHADOW_RAYS);
-        let nodes = NodeBuffers::new(device, &tree, size, waves.capacity).unwrap();
+        let nodes = size.set(device, &tree, waves.capacity).unwrap();
         let wave = Wave {
             pixel_count: surfaces.len() as u32,
             sample_count: 1,
@@ -154,7 +154,7 @@ impl Paths {
         for kernel in kernels {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
-            let sets = [&self.scene.set, &self.nodes.set, &self.waves.set];
+            let sets = [&self.scene.set, &self.nodes, &self.waves.set];
             pass.record(&mut commands, &sets, &self.wave, None);
             commands.submit_and_wait().unwrap();
         }
@@ -172,7 +172,7 @@ impl Paths {
     /// Returns the nodes of a path in Morton order.
     fn nodes_of(&self, path: usize) -> Vec<f32> {
         let (count, stride) = (1_usize << (2 * self.level()), self.surfaces.len());
-        let halves: Vec<u16> = self.nodes.nodes.download(count * stride).unwrap();
+        let halves: Vec<u16> = self.nodes.buffer(HAAR_NODES).download(count * stride).unwrap();
         let node = |node: usize| halves[4 * (node / 4 * stride + path) + node % 4];
         (0..count).map(|index| f16::from_bits(node(index)).to_f32()).collect()
     }
@@ -185,7 +185,7 @@ impl Paths {
             (CONSTANT_HAAR_LEVEL, self.level()),
             (CONSTANT_HAAR_DEPTH, self.tree.depth),
         ];
-        let sets = [&self.scene.set, &self.nodes.set, &self.waves.set];
+        let sets = [&self.scene.set, &self.nodes, &self.waves.set];
         let push = bytemuck::bytes_of(&self.wave);
         support::run_probe_with("haar", &constants, &sets, push, queries)
     }

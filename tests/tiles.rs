@@ -27,6 +27,7 @@ use fenestra::{
     },
     session::{Settings, window_of},
     shader::{
+        bindings,
         rooms::tiles::{CONSTANT_TILES, TILE_RESPONSE_UNITS, TILE_SCALE},
         structs::{SceneParameters, ShadowRay, Wave},
     },
@@ -376,8 +377,9 @@ fn rays_follow_the_density_that_they_are_divided_by() {
             commands.submit_and_wait().unwrap();
         }
         support::assert_silent();
+        let count = (4 * PATHS * SHADOW_RAYS) as usize;
         let rays: Vec<ShadowRay> =
-            waves.answers.shadow_rays.download((4 * PATHS * SHADOW_RAYS) as usize).unwrap();
+            waves.set.buffer(bindings::wave::SHADOW_RAYS).download(count).unwrap();
 
         let tables = EnvironmentTables::new(&cache.scene.environment);
         let brdfs = MaterialTables::new(&cache.scene.materials).unwrap();

@@ -3,7 +3,7 @@
 //! A pipeline sees only the sets that its shader uses, and a set may leave bindings unwritten that the
 //! shader does not use.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{borrow::Borrow, collections::BTreeMap, sync::Arc};
 
 use ash::vk;
 
@@ -30,8 +30,7 @@ pub struct DescriptorSet {
     pool: vk::DescriptorPool,
     pub(super) raw: vk::DescriptorSet,
     views: Vec<vk::BufferView>,
-    /// Kept, since the set refers to them.
-    buffers: Vec<Buffer>,
+    buffers: Vec<(Binding, Buffer)>,
     table: &'static BindingTable,
     device: Arc<Device>,
 }
@@ -45,7 +44,7 @@ impl DescriptorSet {
     pub fn new(
         device: &Arc<Device>,
         table: &'static BindingTable,
-        buffers: &[(Binding, &Buffer)],
+        buffers: &[(Binding, impl Borrow<Buffer>)],
     ) -> Result<Self> {
         let count = table.bindings.len() as u32;
         let sizes = [vk::DescriptorType::STORAGE_BUFFER, vk::DescriptorType::UNIFORM_TEXEL_BUFFER]
@@ -59,7 +58,7 @@ impl DescriptorSet {
             pool,
             raw: vk::DescriptorSet::null(),
             views: Vec::new(),
-            buffers: buffers.iter().map(|(_, buffer)| (*buffer).clone()).collect(),
+            buffers: buffers.iter().map(|(at, buffer)| (*at, buffer.borrow().clone())).collect(),
             table,
             device: Arc::clone(device),
         };
@@ -71,6 +70,7 @@ impl DescriptorSet {
             .called("vkAllocateDescriptorSets")?[0];
         labels::name_object(device, set.raw, table.name);
         for (binding, buffer) in buffers {
+            let buffer = buffer.borrow();
             let info =
                 [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)];
             let mut view = [vk::BufferView::null()];
@@ -135,7 +135,18 @@ impl DescriptorSet {
 
     /// Bytes of the buffers in the set by their names.
     pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        self.buffers.iter().map(|buffer| (buffer.name().to_owned(), buffer.size())).collect()
+        self.buffers.iter().map(|(_, buffer)| (buffer.name().to_owned(), buffer.size())).collect()
+    }
+
+    /// Returns the buffer at a binding.
+    ///
+    /// # Panics
+    /// If the set was made without.
+    pub fn buffer(&self, binding: Binding) -> &Buffer {
+        match self.buffers.iter().find(|(at, _)| at.number == binding.number) {
+            Some((_, buffer)) => buffer,
+            None => panic!("no buffer {} in the set {}", binding.name, self.table.name),
+        }
     }
 
     /// Returns true if the set has a buffer with this number.

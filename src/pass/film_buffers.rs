@@ -127,12 +127,6 @@ struct Page {
     /// Pixels of the window before the page, and in it.
     first: usize,
     pixels: usize,
-    /// One for each of [`LAYERS`].
-    layers: Vec<Buffer>,
-    /// Sum and compensation of every group of lights, pixel by pixel.
-    groups: Buffer,
-    /// Radiance of a sweep, of the picture and of its groups of lights, [`EDGE_ROWS`] included.
-    radiance: Buffer,
 }
 
 impl FilmBuffers {
@@ -290,7 +284,7 @@ impl FilmBuffers {
     pub(crate) fn sweep_samples(&self) -> u32 {
         let page = &self.pages[0];
         let pixels = self.pixels_of(page) as u64 + EDGE_ROWS * u64::from(self.window.width);
-        let samples = page.radiance.size() / (pixels * self.sample_bytes());
+        let samples = page.radiance().size() / (pixels * self.sample_bytes());
         u32::try_from(samples).unwrap_or(u32::MAX).max(1)
     }
 
@@ -301,11 +295,10 @@ impl FilmBuffers {
         let used = self.pages.iter().filter(|page| self.pixels_of(page) > 0);
         let used: Vec<&Page> = used.collect();
         for pair in used.windows(2) {
-            let [above, below] = [pair[0], pair[1]];
-            let rows = above.pixels as u64 / width;
-            commands.copy(&above.radiance, rows * row_bytes, &below.radiance, 0, row_bytes);
-            let end = (rows + 1) * row_bytes;
-            commands.copy(&below.radiance, row_bytes, &above.radiance, end, row_bytes);
+            let rows = pair[0].pixels as u64 / width;
+            let [above, below] = [pair[0].radiance(), pair[1].radiance()];
+            commands.copy(above, rows * row_bytes, below, 0, row_bytes);
+            commands.copy(below, row_bytes, above, (rows + 1) * row_bytes, row_bytes);
         }
     }
 
@@ -316,7 +309,7 @@ impl FilmBuffers {
         for page in &self.pages {
             let edge = self.window.width as usize;
             let pixels = self.pixels_of(page);
-            let all: Vec<[f32; 3]> = page.radiance.download((edge + pixels) * layers)?;
+            let all: Vec<[f32; 3]> = page.radiance().download((edge + pixels) * layers)?;
             for sample in all.chunks_exact(layers).skip(edge) {
                 sums.pending.push(sample[0]);
                 for (group, own) in sums.groups.iter_mut().zip(&sample[1..]) {
@@ -339,7 +332,7 @@ impl FilmBuffers {
                         |name: &String| sums.group(name).map_or([0.0; 3], |own| own.pending[pixel]);
                     samples.extend(self.light_groups.iter().map(of));
                 }
-                page.radiance.upload(bytemuck::cast_slice(&samples))?;
+                page.radiance().upload(bytemuck::cast_slice(&samples))?;
             }
         }
         self.upload_layers(0, &sums.triples())?;
@@ -359,7 +352,8 @@ impl FilmBuffers {
         let values = 2 * self.light_groups.len();
         for page in self.pages.iter().filter(|_| values > 0) {
             let add = |piece: &[_]| all.extend_from_slice(piece);
-            page.groups.download_pieces(self.pixels_of(page) * values, add)?;
+            let groups = page.set.buffer(film::FILM_GROUPS);
+            groups.download_pieces(self.pixels_of(page) * values, add)?;
         }
         let kept = |part: usize| {
             self.kept_rows().flatten().map(|pixel| all[pixel * values + part]).collect()
@@ -388,7 +382,7 @@ impl FilmBuffers {
         }
         for page in self.pages.iter().filter(|page| values > 0 && self.pixels_of(page) > 0) {
             let own = page.first * values..(page.first + self.pixels_of(page)) * values;
-            page.groups.upload(bytemuck::cast_slice(&all[own]))?;
+            page.set.buffer(film::FILM_GROUPS).upload(bytemuck::cast_slice(&all[own]))?;
         }
         Ok(())
     }
@@ -409,7 +403,7 @@ impl FilmBuffers {
             layer.reserve_exact(self.window.width as usize * self.window.height as usize);
             for page in &self.pages {
                 let add = |piece: &[T]| layer.extend_from_slice(piece);
-                page.layers[index].download_pieces(self.pixels_of(page), add)?;
+                page.layer(index).download_pieces(self.pixels_of(page), add)?;
             }
             if !self.is_whole() {
                 **layer = self.kept_rows().flat_map(|row| layer[row].iter().copied()).collect();
@@ -430,17 +424,18 @@ impl FilmBuffers {
             }
             for page in self.pages.iter().filter(|_| is_asked_for(index, self.aovs)) {
                 if let Some(pixels) = layer.get(page.first..page.first + page.pixels) {
-                    page.layers[index].upload(bytemuck::cast_slice(pixels))?;
+                    page.layer(index).upload(bytemuck::cast_slice(pixels))?;
                 }
             }
         }
         Ok(())
     }
 
-    fn buffers(&self) -> impl Iterator<Item = &Buffer> {
-        let others = self.pages.iter().flat_map(|page| [&page.groups, &page.radiance]);
-        let layers = self.pages.iter().flat_map(|page| &page.layers);
-        layers.chain(others).chain([&self.counters])
+    fn buffers<'a>(&'a self) -> impl Iterator<Item = &'a Buffer> {
+        let layers = LAYERS.iter().map(|(_, binding, _)| *binding);
+        let own = layers.chain([film::FILM_GROUPS, film::FILM_RADIANCE]);
+        let of_page = move |page: &'a Page| own.clone().map(|binding| page.set.buffer(binding));
+        self.pages.iter().flat_map(of_page).chain([&self.counters])
     }
 }
 
@@ -455,27 +450,34 @@ impl Page {
         [group_bytes, radiance_bytes]: [u64; 2],
     ) -> Result<Self> {
         let pixels = u64::from(end - first);
-        let radiance = Buffer::zeroed(device, "film radiance", radiance_bytes)?;
-        let groups = Buffer::zeroed(device, "film groups", group_bytes * pixels)?;
-        let make = |(index, (name, ..)): (usize, &(&str, Binding, u32))| {
+        let make = |(index, (name, binding, _)): (usize, &(&str, Binding, u32))| -> Result<_> {
             let bytes = match index {
+                _ if !is_asked_for(index, aovs) => 0,
                 _ if index < TRIPLES.len() => 12,
                 _ if index < FIRST_COVERAGE => 8,
                 _ => size_of::<Coverage>() as u64,
             };
-            Buffer::zeroed(device, name, if is_asked_for(index, aovs) { bytes * pixels } else { 0 })
+            Ok((*binding, Buffer::zeroed(device, name, bytes * pixels)?))
         };
-        let layers = LAYERS.iter().enumerate().map(make).collect::<Result<Vec<_>>>()?;
-        let bound = LAYERS.iter().zip(&layers).map(|((_, binding, _), buffer)| (*binding, buffer));
-        let others = [
-            (film::COUNTERS, counters),
-            (film::FILM_RADIANCE, &radiance),
-            (film::FILM_GROUPS, &groups),
-        ];
-        let bound: Vec<_> = bound.chain(others).collect();
+        let mut bound = LAYERS.iter().enumerate().map(make).collect::<Result<Vec<_>>>()?;
+        let zeroed = |name, bytes| Buffer::zeroed(device, name, bytes);
+        bound.extend([
+            (film::COUNTERS, counters.clone()),
+            (film::FILM_RADIANCE, zeroed("film radiance", radiance_bytes)?),
+            (film::FILM_GROUPS, zeroed("film groups", group_bytes * pixels)?),
+        ]);
         let set = DescriptorSet::new(device, &FILM, &bound)?;
-        let (first, pixels) = (first as usize, pixels as usize);
-        Ok(Self { set, first, pixels, layers, groups, radiance })
+        Ok(Self { set, first: first as usize, pixels: pixels as usize })
+    }
+
+    /// One of [`LAYERS`].
+    fn layer(&self, index: usize) -> &Buffer {
+        self.set.buffer(LAYERS[index].1)
+    }
+
+    /// Radiance of a sweep, of the picture and of its groups of lights, [`EDGE_ROWS`] included.
+    fn radiance(&self) -> &Buffer {
+        self.set.buffer(film::FILM_RADIANCE)
     }
 }
 

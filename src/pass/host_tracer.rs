@@ -22,11 +22,12 @@ use crate::{
     accel::{Accel, traverse::moved_off_surface},
     error::Result,
     gpu::{
-        Buffer, Embree,
+        Buffer, DescriptorSet, Embree,
         embree_rays::{LANES, Packet},
         embree_scene::{EmbreeScene, Search},
     },
     shader::{
+        bindings::{scene, wave as buffers},
         constants::{NO_INSTANCE, NO_MATERIAL, NO_TRIANGLE, PATH_LISTS},
         structs::{Hit, PathState, Ray, ShadowRay, Wave},
     },
@@ -48,38 +49,19 @@ pub struct HostTracer {
     has_instances: bool,
 }
 
-/// Buffers of a wave that the host reads and answers in.
-pub struct Answers {
-    /// [`Ray`] of every path.
-    pub rays: Buffer,
-    /// [`Hit`] of every path.
-    pub hits: Buffer,
-    /// Instance of every hit.
-    pub instances: Buffer,
-    /// [`ShadowRay`]s of the last group: direction `k` of path `i` at `k · path_count + i`.
-    pub shadow_rays: Buffer,
-    /// One word per shadow ray, in their order: 1 if it reaches the light, else 0.
-    pub visibility: Buffer,
-    /// [`PathState`] of every path.
-    pub paths: Buffer,
-    /// Lists of living paths.
-    pub path_lists: Buffer,
-}
-
-impl Answers {
-    /// True if any path that a pass walks has a ray to follow. Fails as [`HostTracer::answer`].
-    pub(super) fn has_rays(&self, wave: &Wave) -> Result<bool> {
-        let ListedPaths { count, list } = ListedPaths::new(wave, &self.path_lists)?;
-        let rays = self.rays.words()?;
-        let is_active = |path: usize| {
-            let word = words_of::<Ray>() * path + offset_of!(Ray, is_active) / size_of::<u32>();
-            rays[word].load(Ordering::Relaxed) != 0
-        };
-        Ok(match list {
-            None => (0..count).any(is_active),
-            Some(list) => list.iter().any(|path| is_active(path.load(Ordering::Relaxed) as usize)),
-        })
-    }
+/// True if any path that a pass walks has a ray to follow; `waves` is the set of the wave. Fails as
+/// [`HostTracer::answer`].
+pub(super) fn has_rays(wave: &Wave, waves: &DescriptorSet) -> Result<bool> {
+    let ListedPaths { count, list } = ListedPaths::new(wave, waves)?;
+    let rays = waves.buffer(buffers::RAY_TEXELS).words()?;
+    let is_active = |path: usize| {
+        let word = words_of::<Ray>() * path + offset_of!(Ray, is_active) / size_of::<u32>();
+        rays[word].load(Ordering::Relaxed) != 0
+    };
+    Ok(match list {
+        None => (0..count).any(is_active),
+        Some(list) => list.iter().any(|path| is_active(path.load(Ordering::Relaxed) as usize)),
+    })
 }
 
 impl HostTracer {
@@ -108,29 +90,31 @@ impl HostTracer {
         })
     }
 
-    /// Answers what a pass asks about the rays of a wave. Returns the number of paths that it walked.
-    /// `parameters` holds [`crate::shader::structs::SceneParameters`]. Fails if the host does not share the
-    /// memory of a buffer.
+    /// Answers what a pass asks about the rays of a wave, in the buffers that the pass would write to of the
+    /// sets of scene and wave. Returns the number of paths that it walked. Fails if the host does not share
+    /// the memory of a buffer.
     pub(super) fn answer(
         &self,
         question: Question,
         wave: &Wave,
-        answers: &Answers,
-        parameters: &Buffer,
+        [scene, waves]: [&DescriptorSet; 2],
     ) -> Result<u32> {
-        let paths = ListedPaths::new(wave, &answers.path_lists)?;
+        let paths = ListedPaths::new(wave, waves)?;
+        let words = |binding| waves.buffer(binding).words();
         let passages = self.passages.as_ref().map(Passages::open).transpose()?;
         let rays = Rays { tree: &self.tree, passages: passages.as_ref() };
         match question {
             Question::Closest => {
+                let instances = self.has_instances.then(|| words(buffers::HIT_INSTANCES));
+                let parameters = scene.buffer(scene::PARAMETERS).words()?;
                 let closest = Closest {
                     rays,
-                    chances: Chances::new(wave, parameters.words()?, self.has_instances),
+                    chances: Chances::new(wave, parameters, self.has_instances),
                     is_coherent: wave.vertex == 0,
-                    from: answers.rays.words()?,
-                    hits: answers.hits.words()?,
-                    instances: self.has_instances.then(|| answers.instances.words()).transpose()?,
-                    paths: answers.paths.words()?,
+                    from: words(buffers::RAY_TEXELS)?,
+                    hits: words(buffers::HITS)?,
+                    instances: instances.transpose()?,
+                    paths: words(buffers::PATHS)?,
                 };
                 paths.for_each_chunk(|paths| closest.answer(paths));
             }
@@ -139,9 +123,9 @@ impl HostTracer {
                     rays,
                     wave,
                     ray_offset: self.ray_offset,
-                    hits: answers.hits.words()?,
-                    shadow_rays: answers.shadow_rays.words()?,
-                    visibility: answers.visibility.words()?,
+                    hits: words(buffers::HIT_TEXELS)?,
+                    shadow_rays: words(buffers::SHADOW_RAY_TEXELS)?,
+                    visibility: words(buffers::VISIBILITY)?,
                 };
                 paths.for_each_chunk(|paths| visible.answer(paths));
             }
@@ -355,12 +339,12 @@ struct ListedPaths<'a> {
 }
 
 impl<'a> ListedPaths<'a> {
-    fn new(wave: &Wave, path_lists: &'a Buffer) -> Result<Self> {
+    fn new(wave: &Wave, waves: &'a DescriptorSet) -> Result<Self> {
         let all = (wave.pixel_count * wave.sample_count) as usize;
         let Some(list) = wave.path_list.checked_sub(1) else {
             return Ok(Self { count: all, list: None });
         };
-        let words = path_lists.words()?;
+        let words = waves.buffer(buffers::PATH_LIST_TEXELS).words()?;
         let count = words[list as usize].load(Ordering::Relaxed) as usize;
         let start = PATH_LISTS as usize + (list & 1) as usize * all;
         Ok(Self { count, list: Some(&words[start..start + count]) })

@@ -31,7 +31,6 @@ pub(crate) mod wave_buffers;
 pub(crate) use explanation::{Explanation, LobeReadback, PixelReadback, RayReadback};
 pub(crate) use film_buffers::BLOCK_PIXELS;
 pub use geometry::{GeometryBuffers, Schedule};
-pub use host_tracer::Answers;
 pub(crate) use kernel::Domain;
 pub use kernel::{Dispatch, Kernel, Pass};
 pub use order::{PassSettings, PathLists, WaveOrder, wave_order};

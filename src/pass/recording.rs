@@ -3,17 +3,14 @@
 use std::{sync::Arc, time::Instant};
 
 use super::{
-    host_tracer::{Answers, HostTracer},
+    host_tracer::{HostTracer, has_rays},
     kernel::{Pass, Question},
 };
 use crate::{
     error::Result,
-    gpu::{Buffer, Commands, DescriptorSet, Device, PassTimes},
+    gpu::{Commands, DescriptorSet, Device, PassTimes},
     shader::structs::Wave,
 };
-
-/// The host's tracer, the buffers of the wave whose rays it follows, and the parameters of the scene.
-pub type Host<'a> = (&'a HostTracer, &'a Answers, &'a Buffer);
 
 /// Passes over a wave, in their order.
 pub struct Recording<'a> {
@@ -22,7 +19,7 @@ pub struct Recording<'a> {
     /// Passes of one submission, at most.
     most_passes: u32,
     times: PassTimes,
-    host: Option<Host<'a>>,
+    host: Option<&'a HostTracer>,
     ends: bool,
     /// Most paths of the lists from here on: those whose rays the vertex began with.
     most_listed: Option<u32>,
@@ -37,7 +34,7 @@ impl<'a> Recording<'a> {
     pub fn begin(
         device: &'a Arc<Device>,
         most_passes: u32,
-        host: Option<Host<'a>>,
+        host: Option<&'a HostTracer>,
         ends: bool,
     ) -> Result<Self> {
         let commands = Commands::begin_timed(device, most_passes)?;
@@ -45,14 +42,14 @@ impl<'a> Recording<'a> {
         Ok(Self { device, commands, most_passes, times, host, ends, most_listed: None })
     }
 
-    /// Adds a pass. If it asks the host, waits for all before and lets the host answer first. Returns false,
-    /// and adds nothing, if the host finds that no path has a ray left.
+    /// Adds a pass. If it asks the host, waits for all before and lets the host answer first, in those of
+    /// `sets` that come first: of the scene and of the wave. Returns false, and adds nothing, if the host
+    /// finds that no path has a ray left.
     ///
     /// # Errors
     /// As [`Commands::submit_and_wait`].
     pub fn add(&mut self, pass: &Pass, sets: &[&DescriptorSet], wave: &Wave) -> Result<bool> {
         if let (Some(question), Some(host)) = (pass.kernel.question, self.host) {
-            let (tracer, answers, parameters) = host;
             let next = Commands::begin_timed(self.device, self.most_passes)?;
             let mut before = std::mem::replace(&mut self.commands, next);
             before.make_visible_to_host();
@@ -60,10 +57,10 @@ impl<'a> Recording<'a> {
             let start = Instant::now();
             // Cohorts need the first two vertices of all paths.
             let may_end = self.ends && question == Question::Closest && wave.vertex > 1;
-            if may_end && !answers.has_rays(wave)? {
+            if may_end && !has_rays(wave, sets[1])? {
                 return Ok(false);
             }
-            let walked = tracer.answer(question, wave, answers, parameters)?;
+            let walked = host.answer(question, wave, [sets[0], sets[1]])?;
             if question == Question::Closest {
                 self.most_listed = Some(walked);
             }

@@ -273,8 +273,7 @@ impl Runner {
         let wave = Wave { film_start, ..wave };
         let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
         let order = wave_order(&settings, technique.steps(), wave, vertices);
-        let tracer = self.scene.geometry.host_tracer();
-        let host = tracer.map(|tracer| (tracer, &self.waves.answers, &self.scene.parameter_buffer));
+        let host = self.scene.geometry.host_tracer();
         let pages = if accumulates { self.accumulated().count() } else { 0 };
         let accumulation = self.accumulation();
         made(&mut self.passes, &self.device, accumulation)?;

@@ -37,8 +37,6 @@ pub struct SceneBuffers {
     pub set: DescriptorSet,
     /// Tree and triangles.
     pub(crate) geometry: GeometryBuffers,
-    /// [`SceneParameters`].
-    pub(crate) parameter_buffer: Buffer,
     parameters: SceneParameters,
     /// Specialization of passes by the surfaces of the scene.
     pub surfaces: Surfaces,
@@ -140,10 +138,9 @@ impl SceneBuffers {
             compensated_total,
             ..parameters(scene, map, total, window)
         };
-        let parameter_buffer = Buffer::from_slice(device, "parameters", &[parameters])?;
         let words = |name, words: &[u32]| Buffer::from_slice(device, name, words);
         let own: [(Binding, Buffer); 18] = [
-            (bindings::PARAMETERS, parameter_buffer.clone()),
+            (bindings::PARAMETERS, Buffer::from_slice(device, "parameters", &[parameters])?),
             (bindings::ENVIRONMENT_TEXELS, texels),
             (bindings::ENVIRONMENT_ROWS, rows),
             (bindings::ENVIRONMENT_CELLS, cells),
@@ -169,16 +166,7 @@ impl SceneBuffers {
         let bound: Vec<_> = own.chain(geometry.bindings()).chain(textures.bindings()).collect();
         let set = DescriptorSet::new(device, &SCENE, &bound)?;
         host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
-        Ok(Self {
-            set,
-            geometry,
-            parameter_buffer,
-            parameters,
-            surfaces,
-            window,
-            light_groups,
-            host_ms,
-        })
+        Ok(Self { set, geometry, parameters, surfaces, window, light_groups, host_ms })
     }
 
     /// Looks at the scene through another camera, on a whole film of `size` pixels. Fails if the device
@@ -193,7 +181,7 @@ impl SceneBuffers {
             crop_height: height,
             ..with_camera(self.parameters, camera)
         };
-        self.parameter_buffer.upload(bytemuck::bytes_of(&parameters))
+        self.set.buffer(bindings::PARAMETERS).upload(bytemuck::bytes_of(&parameters))
     }
 
     /// Filter of the film.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{host_tracer::Answers, steps::PathDemand, surfaces::Surfaces};
+use super::{steps::PathDemand, surfaces::Surfaces};
 use crate::{
     error::Result,
     gpu::{Buffer, Capabilities, DescriptorSet, Device},
@@ -36,8 +36,6 @@ pub struct WaveBuffers {
     pub set: DescriptorSet,
     /// Largest number of paths in a wave.
     pub capacity: u32,
-    /// Buffers that passes answer in, or the host where it traces.
-    pub answers: Answers,
 }
 
 impl WaveBuffers {
@@ -75,42 +73,32 @@ impl WaveBuffers {
         let groups = u64::from(demand.light_groups);
         let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
         let make_if = |is_needed, name, size| make(name, if is_needed { paths } else { 1 }, size);
-        let answers = Answers {
-            rays: make("rays", paths, size_of::<Ray>())?,
-            hits: make("hits", paths, size_of::<Hit>())?,
-            instances: make_if(of.has(SURFACES_INSTANCED), "hit instances", size_of::<u32>())?,
-            shadow_rays: make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?,
-            visibility: make("visibility", shadow_ray_count, size_of::<u32>())?,
-            paths: make("paths", paths, size_of::<PathState>())?,
-            path_lists: Buffer::new(device, "path lists", path_list_bytes(paths))?,
-        };
-        let surfaces = make_if(of.has(SURFACES_TEXTURED), "hit surfaces", size_of::<Surface>())?;
-        let lamp_lists = make_if(of.has(SURFACES_LAMP_CELLS), "lamp lists", size_of::<u32>())?;
-        let features = make_if(demand.has_features, "features", size_of::<Feature>())?;
+        let rays = make("rays", paths, size_of::<Ray>())?;
+        let hits = make("hits", paths, size_of::<Hit>())?;
+        let shadow_rays = make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?;
+        let path_lists = Buffer::new(device, "path lists", path_list_bytes(paths))?;
         let radiance_count = (groups * paths).max(1);
-        let group_radiance = make("group radiance", radiance_count, size_of::<[f32; 3]>())?;
-        let lamp_groups = make_if(groups > 0, "lamp groups", size_of::<u32>())?;
-        let Answers { rays, hits, instances, shadow_rays, visibility, paths, path_lists } =
-            &answers;
+        let (words, colours) = (size_of::<u32>(), size_of::<[f32; 3]>());
+        let [textured, instanced, by_place] =
+            [SURFACES_TEXTURED, SURFACES_INSTANCED, SURFACES_LAMP_CELLS].map(|bit| of.has(bit));
         let bound = [
-            (wave::RAYS, rays),
+            (wave::RAYS, rays.clone()),
             (wave::RAY_TEXELS, rays),
-            (wave::HITS, hits),
+            (wave::HITS, hits.clone()),
             (wave::HIT_TEXELS, hits),
-            (wave::SHADOW_RAYS, shadow_rays),
+            (wave::SHADOW_RAYS, shadow_rays.clone()),
             (wave::SHADOW_RAY_TEXELS, shadow_rays),
-            (wave::VISIBILITY, visibility),
-            (wave::PATHS, paths),
-            (wave::HIT_SURFACES, &surfaces),
-            (wave::HIT_INSTANCES, instances),
-            (wave::PATH_LISTS, path_lists),
+            (wave::VISIBILITY, make("visibility", shadow_ray_count, words)?),
+            (wave::PATHS, make("paths", paths, size_of::<PathState>())?),
+            (wave::HIT_SURFACES, make_if(textured, "hit surfaces", size_of::<Surface>())?),
+            (wave::HIT_INSTANCES, make_if(instanced, "hit instances", words)?),
+            (wave::PATH_LISTS, path_lists.clone()),
             (wave::PATH_LIST_TEXELS, path_lists),
-            (wave::LAMP_LISTS, &lamp_lists),
-            (wave::FEATURES, &features),
-            (wave::GROUP_RADIANCE, &group_radiance),
-            (wave::LAMP_GROUPS, &lamp_groups),
+            (wave::LAMP_LISTS, make_if(by_place, "lamp lists", words)?),
+            (wave::FEATURES, make_if(demand.has_features, "features", size_of::<Feature>())?),
+            (wave::GROUP_RADIANCE, make("group radiance", radiance_count, colours)?),
+            (wave::LAMP_GROUPS, make_if(groups > 0, "lamp groups", words)?),
         ];
-        let set = DescriptorSet::new(device, &WAVE, &bound)?;
-        Ok(Self { set, capacity, answers })
+        Ok(Self { set: DescriptorSet::new(device, &WAVE, &bound)?, capacity })
     }
 }

@@ -26,6 +26,7 @@ use crate::{
     },
     scene::Scene,
     shader::{
+        bindings::wave,
         constants::NO_MATERIAL,
         structs::{Hit, ShadowRay},
     },
@@ -152,7 +153,8 @@ impl Renderer {
             self.runner.limit_shadow_rays(count.min(most));
             self.restart(self.settings.seed)?;
             self.render_pass(1)?;
-            let hit: Hit = element(&self.runner.waves.answers.hits, 0)?;
+            let buffer = |binding| self.runner.waves.set.buffer(binding);
+            let hit: Hit = element(buffer(wave::HITS), 0)?;
             if hit.material == NO_MATERIAL {
                 return Ok(None);
             }
@@ -168,8 +170,8 @@ impl Renderer {
             }
             let in_group = self.runner.last_group_rays(self.technique.steps()) - 1;
             let last = (in_group * BLOCK_PIXELS) as usize;
-            let ray: ShadowRay = element(&self.runner.waves.answers.shadow_rays, last)?;
-            let visible: u32 = element(&self.runner.waves.answers.visibility, last)?;
+            let ray: ShadowRay = element(buffer(wave::SHADOW_RAYS), last)?;
+            let visible: u32 = element(buffer(wave::VISIBILITY), last)?;
             pixel.rays.push(RayReadback {
                 direction: ray.direction.into(),
                 contribution: ray.contribution.into(),

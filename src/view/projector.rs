@@ -46,7 +46,7 @@ pub(crate) struct Projector {
     show: Pipeline,
     compose: Pipeline,
     /// Linear pixels of both films, and the set that writes each.
-    shown: [(Buffer, DescriptorSet); 2],
+    shown: [DescriptorSet; 2],
     /// Width and height of the whole film, whose shape the picture has.
     film: [u32; 2],
     /// Width and height of what each of them shows.
@@ -54,8 +54,8 @@ pub(crate) struct Projector {
     inset: Buffer,
     inset_size: [u32; 2],
     overlay: Overlay,
-    /// Pixels of the window, room for an overlay of its size, and the set of both.
-    window: Option<(Buffer, Buffer, DescriptorSet)>,
+    /// Pixels of the window and room for an overlay of its size.
+    window: Option<DescriptorSet>,
     window_size: [u32; 2],
 }
 
@@ -64,10 +64,9 @@ impl Projector {
     pub(crate) fn new(device: &Arc<Device>, film: [u32; 2], inset: [u32; 2]) -> Result<Self> {
         let area = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
         let pipeline = |name| Pipeline::new(device, name, spirv::pass(name), &[]);
-        let shown = |name| -> Result<_> {
+        let shown = |name| {
             let buffer = Buffer::zeroed(device, name, 12 * area(film))?;
-            let set = DescriptorSet::new(device, &VIEW, &[(view::SHOWN, &buffer)])?;
-            Ok((buffer, set))
+            DescriptorSet::new(device, &VIEW, &[(view::SHOWN, buffer)])
         };
         Ok(Self {
             device: Arc::clone(device),
@@ -106,7 +105,7 @@ impl Projector {
                     layer,
                     mean_radiance,
                 };
-                let sets = [film, &self.shown[index].1];
+                let sets = [film, &self.shown[index]];
                 let bytes = bytemuck::bytes_of(&constants);
                 commands.dispatch(&self.show, &sets, bytes, end_place - first_place);
             }
@@ -129,8 +128,9 @@ impl Projector {
     /// Replaces the controls and returns those before. Fails if the device does.
     pub(crate) fn set_overlay(&mut self, overlay: Overlay) -> Result<Overlay> {
         let before = std::mem::replace(&mut self.overlay, overlay);
-        if let Some((_, room, _)) = self.window.as_ref().filter(|_| self.has_overlay()) {
-            room.upload(bytemuck::cast_slice(&self.overlay.picture.pixels))?;
+        if let Some(window) = self.window.as_ref().filter(|_| self.has_overlay()) {
+            let pixels = bytemuck::cast_slice(&self.overlay.picture.pixels);
+            window.buffer(view::OVERLAY).upload(pixels)?;
         }
         Ok(before)
     }
@@ -189,7 +189,7 @@ impl Projector {
             overlay_width: overlay[0],
             overlay_height: overlay[1],
         };
-        let (buffer, _, set) = self.window.insert(window);
+        let set = &*self.window.insert(window);
         let mut commands = Commands::begin(&self.device)?;
         let pixels = width * height;
         for first_index in (0..pixels).step_by(MOST_INVOCATIONS as usize) {
@@ -198,41 +198,37 @@ impl Projector {
             commands.dispatch(&self.compose, &[set], bytemuck::bytes_of(&frame), invocations);
         }
         commands.submit_and_wait()?;
-        Ok(buffer.clone())
+        Ok(set.buffer(view::WINDOW_PIXELS).clone())
     }
 
-    fn make_window(
-        &mut self,
-        [width, height]: [u32; 2],
-    ) -> Result<(Buffer, Buffer, DescriptorSet)> {
+    fn make_window(&mut self, [width, height]: [u32; 2]) -> Result<DescriptorSet> {
         let bytes = 4 * u64::from(width) * u64::from(height);
-        let buffer = Buffer::new(&self.device, "window", bytes)?;
         let overlay = Buffer::new(&self.device, "controls", bytes)?;
         let bound = [
-            (view::SHOWN, &self.shown[0].0),
-            (view::SHOWN_RIGHT, &self.shown[1].0),
+            (view::SHOWN, self.shown[0].buffer(view::SHOWN)),
+            (view::SHOWN_RIGHT, self.shown[1].buffer(view::SHOWN)),
             (view::INSET, &self.inset),
             (view::OVERLAY, &overlay),
-            (view::WINDOW_PIXELS, &buffer),
+            (view::WINDOW_PIXELS, &Buffer::new(&self.device, "window", bytes)?),
         ];
         let set = DescriptorSet::new(&self.device, &VIEW, &bound)?;
         self.window_size = [width, height];
         if self.has_overlay() {
             overlay.upload(bytemuck::cast_slice(&self.overlay.picture.pixels))?;
         }
-        Ok((buffer, overlay, set))
+        Ok(set)
     }
 
     /// Replaces the linear pixels of a film as it was shown last. Fails if the device does.
     pub(crate) fn replace(&self, place: Place, pixels: &[[f32; 3]]) -> Result<()> {
-        self.shown[place as usize].0.upload(bytemuck::cast_slice(pixels))
+        self.shown[place as usize].buffer(view::SHOWN).upload(bytemuck::cast_slice(pixels))
     }
 
     /// Returns the linear pixels of a film as they were shown last. Fails if the device does.
     pub(crate) fn shown(&self, place: Place) -> Result<Vec<[f32; 3]>> {
         let index = place as usize;
         let [width, height] = self.sizes[index];
-        self.shown[index].0.download(width as usize * height as usize)
+        self.shown[index].buffer(view::SHOWN).download(width as usize * height as usize)
     }
 
     /// Returns the pixel of a film of `film` pixels under a place in the window, as composed last.

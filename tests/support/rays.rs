@@ -4,7 +4,7 @@
 use fenestra::{
     accel::Accel,
     gpu::{Buffer, DescriptorSet},
-    pass::{Answers, GeometryBuffers, Kernel, Pass, Recording, Schedule, Surfaces},
+    pass::{GeometryBuffers, Kernel, Pass, Recording, Schedule, Surfaces},
     scene::Geometry,
     shader::{
         bindings::{Binding, BindingTable, FILM, SCENE, WAVE, film, wave as bindings},
@@ -176,14 +176,8 @@ impl OnDevice {
             (bindings::HITS, &hits),
             (bindings::HIT_INSTANCES, &instances),
         ];
-        let answers = Answers {
-            rays: ray_buffer.clone(),
-            hits: hits.clone(),
-            instances: instances.clone(),
-            ..self.no_answers()
-        };
         let kernel = self.geometry.traversal().trace(schedule, Surfaces::default());
-        self.run(kernel, &own, &answers, wave(rays.len(), 0));
+        self.run(kernel, &own, wave(rays.len(), 0));
         hits.download(rays.len()).unwrap()
     }
 
@@ -200,36 +194,17 @@ impl OnDevice {
             (bindings::SHADOW_RAY_TEXELS, &ray_buffer),
             (bindings::VISIBILITY, &visibility),
         ];
-        let answers = Answers {
-            hits: hit_buffer.clone(),
-            shadow_rays: ray_buffer.clone(),
-            visibility: visibility.clone(),
-            ..self.no_answers()
-        };
         let directions = (shadow_rays.len() / hits.len()) as u32;
         let kernel = self.geometry.traversal().shadow(schedule, Surfaces::default());
-        self.run(kernel, &own, &answers, wave(hits.len(), directions));
+        self.run(kernel, &own, wave(hits.len(), directions));
         visibility.download(shadow_rays.len()).unwrap()
     }
 
-    fn no_answers(&self) -> Answers {
-        let none = || self.spare.clone();
-        Answers {
-            rays: none(),
-            hits: none(),
-            instances: none(),
-            shadow_rays: none(),
-            visibility: none(),
-            paths: none(),
-            path_lists: none(),
-        }
-    }
-
-    fn run(&self, kernel: Kernel, own: &[(Binding, &Buffer)], answers: &Answers, wave: Wave) {
+    fn run(&self, kernel: Kernel, own: &[(Binding, &Buffer)], wave: Wave) {
         let device = super::device();
         let wave_set = set(&WAVE, own, &self.spare);
         let pass = Pass::new(device, kernel).unwrap();
-        let host = self.geometry.host_tracer().map(|tracer| (tracer, answers, &self.spare));
+        let host = self.geometry.host_tracer();
         let mut recording = Recording::begin(device, 1, host, false).unwrap();
         recording.add(&pass, &[&self.scene, &wave_set, &self.film], &wave).unwrap();
         recording.finish().unwrap();

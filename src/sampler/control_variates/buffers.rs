@@ -7,29 +7,26 @@ use crate::{
     error::Result,
     gpu::{Buffer, DescriptorSet, Device},
     sampler::pilot::Tables,
-    shader::rooms::control_variates,
+    shader::rooms::control_variates::{RECORD_COUNTS, RECORD_VISIBILITIES, TABLE},
 };
 
 /// The visibility records on a device.
 pub struct RecordBuffers {
     set: DescriptorSet,
     grid: RecordGrid,
-    counts: Buffer,
-    visibilities: Buffer,
 }
 
 impl RecordBuffers {
     /// Allocates records of undefined content. Fails if the device does or its limits are exceeded.
     pub fn new(device: &Arc<Device>, grid: RecordGrid) -> Result<Self> {
         let entries = grid.entries() as u64;
-        let counts = Buffer::new(device, "record counts", 8 * entries)?;
-        let visibilities = Buffer::new(device, "record visibilities", 4 * entries)?;
+        let make = |name, bytes| Buffer::new(device, name, bytes);
         let bound = [
-            (control_variates::RECORD_COUNTS, &counts),
-            (control_variates::RECORD_VISIBILITIES, &visibilities),
+            (RECORD_COUNTS, make("record counts", 8 * entries)?),
+            (RECORD_VISIBILITIES, make("record visibilities", 4 * entries)?),
         ];
-        let set = DescriptorSet::new(device, &control_variates::TABLE, &bound)?;
-        Ok(Self { set, grid, counts, visibilities })
+        let set = DescriptorSet::new(device, &TABLE, &bound)?;
+        Ok(Self { set, grid })
     }
 }
 
@@ -41,11 +38,12 @@ impl Tables for RecordBuffers {
     }
 
     fn forget(&self) -> Result<()> {
-        self.counts.clear()
+        self.set.buffer(RECORD_COUNTS).clear()
     }
 
     fn freeze(&self) -> Result<()> {
-        let expected = self.grid.expected(&self.counts.download(self.grid.entries())?);
-        self.visibilities.upload(bytemuck::cast_slice(&expected))
+        let counts = self.set.buffer(RECORD_COUNTS).download(self.grid.entries())?;
+        let expected = self.grid.expected(&counts);
+        self.set.buffer(RECORD_VISIBILITIES).upload(bytemuck::cast_slice(&expected))
     }
 }

@@ -7,7 +7,6 @@ use bytemuck::Pod;
 use super::{
     ARRIVAL_DIRECTIONS, ArrivalWords, CellKey, CountWords, Guide, GuideState, MAX_CELLS, Origin,
     PARTS_PER_RAY, SHARE_WORDS, Snapshot,
-    arrival_buffers::{self, ArrivalBuffers},
     budget::GuideBudget,
     cell_readback::{CellReadback, RegionReadback},
     decode_entry, decode_visibility,
@@ -18,7 +17,10 @@ use crate::{
     gpu::{Buffer, Commands, DescriptorSet, Device},
     sampler::regions::{FACE_COUNT, Partition, bounds_of, cell_edges},
     scene::{self, Scene},
-    shader::rooms::guided::{self, GUIDE_COUNT_WORDS, GUIDE_NO_KEY, GuideParameters, PathCell},
+    shader::{
+        bindings::Binding,
+        rooms::guided::{self, GUIDE_COUNT_WORDS, GUIDE_NO_KEY, GuideParameters, PathCell},
+    },
 };
 
 /// Pixels along the edge of a cell, unless the scene limits it.
@@ -28,6 +30,10 @@ const LEVELS: i32 = 12;
 const COUNT_BYTES: u64 = 4 * GUIDE_COUNT_WORDS as u64;
 /// Bytes of a cell per region: an entry to read and counts to write.
 const BYTES_PER_REGION: u64 = 8 + COUNT_BYTES;
+const ARRIVAL_BYTES: u64 = size_of::<ArrivalWords>() as u64;
+/// Bytes of a cell that knows arriving light: by direction the light and two counted words, and its
+/// reflected light.
+const ARRIVALS_PER_CELL: u64 = (4 + ARRIVAL_BYTES) * ARRIVAL_DIRECTIONS as u64 + 4;
 /// Divisor of the counts when the geometry has changed.
 const FORGETTING: u32 = 8;
 /// Number of cells that fit at least, memory permitting.
@@ -75,18 +81,9 @@ pub struct GuideBuffers {
     budget: GuideBudget,
     origin: Origin,
     layout: GuideParameters,
-    parameters: Buffer,
-    table: Buffer,
-    entries: Buffer,
-    regions: Buffer,
-    aliases: Buffer,
-    region_of_cell: Buffer,
-    counts: Buffer,
-    shares: Buffer,
-    missing: Buffer,
-    targets: Buffer,
-    arrivals: Option<ArrivalBuffers>,
+    slots: usize,
     missing_slots: usize,
+    has_bounces: bool,
     /// Host milliseconds spent on rebuilds since the start.
     pub(super) rebuild_ms: f64,
 }
@@ -106,8 +103,7 @@ impl GuideBuffers {
         let useful_cells = FEW_CELLS.max(u64::from(size.pixels) / PIXELS_PER_CELL) as usize;
         let useful_cells = useful_cells.min(MAX_CELLS);
         // The other memory of cells weighs most per region with the fewest regions.
-        let besides = 4 * SHARE_WORDS as u64
-            + if size.has_bounces { arrival_buffers::BYTES_PER_CELL } else { 0 };
+        let besides = 4 * SHARE_WORDS as u64 + if size.has_bounces { ARRIVALS_PER_CELL } else { 0 };
         let by_memory =
             parameters.guide_memory / (BYTES_PER_REGION + besides.div_ceil(region_count as u64));
         let by_range = device.capabilities().max_storage_buffer_range / COUNT_BYTES;
@@ -135,36 +131,34 @@ impl GuideBuffers {
             grid_origin: guide.grid_origin,
             largest_edge: guide.largest_edge,
         };
-        let parameters = Buffer::from_slice(device, "guide parameters", &[guide])?;
-        let table = Buffer::new(device, "guide table", 8 * slots as u64)?;
-        let entries = Buffer::new(device, "guide entries", entry_bytes)?;
-        let regions = Buffer::texels_from_slice(device, "guide regions", &regions)?;
-        let aliases = Buffer::texels_from_slice(device, "guide aliases", &aliases)?;
-        let region_of_cell =
-            Buffer::texels_from_slice(device, "guide region of cell", &partition.region_of_cell)?;
-        let counts = Buffer::new(device, "guide counts", count_bytes)?;
-        let shares = Buffer::new(device, "guide shares", 4 * (capacity * SHARE_WORDS) as u64)?;
-        let missing = Buffer::new(device, "guide missing", 4 * missing_slots as u64)?;
         let rays = u64::from(size.paths) * u64::from(size.shadow_rays);
-        let targets = Buffer::new(device, "learn targets", 8 * rays)?;
         let path_bytes = u64::from(size.paths) * size_of::<PathCell>() as u64;
-        let path_cells = Buffer::new(device, "path cells", path_bytes)?;
-        let arrivals =
-            size.has_bounces.then(|| ArrivalBuffers::new(device, capacity)).transpose()?;
+        let make = |name, bytes| Buffer::new(device, name, bytes);
+        let of_cell = &partition.region_of_cell;
         let mut bound = vec![
-            (guided::GUIDE, &parameters),
-            (guided::GUIDE_TABLE, &table),
-            (guided::GUIDE_ENTRIES, &entries),
-            (guided::GUIDE_REGIONS, &regions),
-            (guided::GUIDE_ALIASES, &aliases),
-            (guided::GUIDE_REGION_OF_CELL, &region_of_cell),
-            (guided::GUIDE_COUNTS, &counts),
-            (guided::GUIDE_SHARES, &shares),
-            (guided::GUIDE_MISSING, &missing),
-            (guided::LEARN_TARGETS, &targets),
-            (guided::PATH_CELLS, &path_cells),
+            (guided::GUIDE, Buffer::from_slice(device, "guide parameters", &[guide])?),
+            (guided::GUIDE_TABLE, make("guide table", 8 * slots as u64)?),
+            (guided::GUIDE_ENTRIES, make("guide entries", entry_bytes)?),
+            (guided::GUIDE_REGIONS, Buffer::texels_from_slice(device, "guide regions", &regions)?),
+            (guided::GUIDE_ALIASES, Buffer::texels_from_slice(device, "guide aliases", &aliases)?),
+            (
+                guided::GUIDE_REGION_OF_CELL,
+                Buffer::texels_from_slice(device, "guide region of cell", of_cell)?,
+            ),
+            (guided::GUIDE_COUNTS, make("guide counts", count_bytes)?),
+            (guided::GUIDE_SHARES, make("guide shares", 4 * (capacity * SHARE_WORDS) as u64)?),
+            (guided::GUIDE_MISSING, make("guide missing", 4 * missing_slots as u64)?),
+            (guided::LEARN_TARGETS, make("learn targets", 8 * rays)?),
+            (guided::PATH_CELLS, make("path cells", path_bytes)?),
         ];
-        bound.extend(arrivals.iter().flat_map(ArrivalBuffers::bindings));
+        if size.has_bounces {
+            let directions = (capacity * ARRIVAL_DIRECTIONS) as u64;
+            bound.extend([
+                (guided::GUIDE_ARRIVING, make("guide arriving", 4 * directions)?),
+                (guided::GUIDE_REFLECTED, make("guide reflected", 4 * capacity as u64)?),
+                (guided::GUIDE_ARRIVALS, make("guide arrivals", ARRIVAL_BYTES * directions)?),
+            ]);
+        }
         let set = DescriptorSet::new(device, &guided::TABLE, &bound)?;
         let mut buffers = Self {
             device: Arc::clone(device),
@@ -176,18 +170,9 @@ impl GuideBuffers {
             budget,
             origin,
             layout: guide,
-            parameters,
-            table,
-            entries,
-            regions,
-            aliases,
-            region_of_cell,
-            counts,
-            shares,
-            missing,
-            targets,
-            arrivals,
+            slots,
             missing_slots,
+            has_bounces: size.has_bounces,
             rebuild_ms: 0.0,
         };
         buffers.forget()?;
@@ -207,7 +192,7 @@ impl GuideBuffers {
         let learned = Guide::new(
             self.partition.regions.len(),
             self.budget.cells(self.partition.regions.len()),
-            self.table.size() as usize / 8,
+            self.slots,
         );
         self.learned = self.with_bounces(learned, &[], 1);
         self.rebuild_ms = 0.0;
@@ -215,8 +200,25 @@ impl GuideBuffers {
         self.upload()
     }
 
+    fn upload_to<T: Pod>(&self, binding: Binding, values: &[T]) -> Result<()> {
+        self.set.buffer(binding).upload(bytemuck::cast_slice(values))
+    }
+
+    fn missing(&self) -> Result<Vec<u32>> {
+        self.set.buffer(guided::GUIDE_MISSING).download(self.missing_slots)
+    }
+
+    /// Reads the counts of arriving light; none without guided bounces.
+    fn arrivals(&self) -> Result<Vec<ArrivalWords>> {
+        if !self.has_bounces {
+            return Ok(Vec::new());
+        }
+        let directions = self.learned.cell_count() * ARRIVAL_DIRECTIONS;
+        self.set.buffer(guided::GUIDE_ARRIVALS).download(directions)
+    }
+
     fn with_bounces(&self, learned: Guide, words: &[ArrivalWords], forget: u32) -> Guide {
-        if self.arrivals.is_some() { learned.with_bounces(words, forget) } else { learned }
+        if self.has_bounces { learned.with_bounces(words, forget) } else { learned }
     }
 
     /// Turns the counts of passes into tables for the next ones. Splits the map again if `splits`,
@@ -225,17 +227,16 @@ impl GuideBuffers {
         let start = Instant::now();
         let counted = self.learned.cell_count() * self.partition.regions.len();
         let mut first = 0;
-        self.counts.download_pieces::<CountWords>(counted, |piece| {
+        self.set.buffer(guided::GUIDE_COUNTS).download_pieces::<CountWords>(counted, |piece| {
             self.learned.add(first, piece);
             first += piece.len();
         })?;
         let words = self.learned.cell_count() * SHARE_WORDS;
-        self.learned.add_shares(&self.shares.download::<u32>(words)?);
-        if let Some(arrivals) = &self.arrivals {
-            let counted = arrivals.counted(self.learned.cell_count())?;
-            self.learned.add_arrivals(&counted, &self.snapshot.reflected);
+        self.learned.add_shares(&self.set.buffer(guided::GUIDE_SHARES).download::<u32>(words)?);
+        if self.has_bounces {
+            self.learned.add_arrivals(&self.arrivals()?, &self.snapshot.reflected);
         }
-        self.learned.add_cells(&self.missing.download::<u32>(self.missing_slots)?);
+        self.learned.add_cells(&self.missing()?);
         let now = self.partition.regions.len();
         let rays = if now < self.budget.max_regions { self.learned.rays() } else { 0 };
         let count = self.budget.regions(now, self.learned.cell_count(), rays);
@@ -259,7 +260,7 @@ impl GuideBuffers {
     /// Reads the targets of the first `count` shadow rays of the last group: region + number of
     /// regions · cell, or `NOTHING_TO_LEARN`. Fails if the device does.
     pub fn targets(&self, count: usize) -> Result<Vec<u32>> {
-        let words: Vec<[u32; 2]> = self.targets.download(count)?;
+        let words: Vec<[u32; 2]> = self.set.buffer(guided::LEARN_TARGETS).download(count)?;
         Ok(words.into_iter().map(|[target, _]| target).collect())
     }
 
@@ -284,17 +285,14 @@ impl GuideBuffers {
     /// Returns what was learned, and the counts since the last rebuild. Fails if the device does.
     pub fn state(&self) -> Result<GuideState> {
         let counted = self.learned.cell_count() * self.partition.regions.len();
-        let missing = self.missing.download::<u32>(self.missing_slots)?;
-        let arrivals = self.arrivals.as_ref();
-        let pending_arrivals =
-            arrivals.map(|arrivals| arrivals.counted(self.learned.cell_count())).transpose()?;
+        let shares = self.learned.cell_count() * SHARE_WORDS;
         Ok(GuideState {
             origin: self.origin.clone(),
             rectangles: self.partition.rectangles(),
-            pending: self.counts.download(counted)?,
-            pending_shares: self.shares.download(self.learned.cell_count() * SHARE_WORDS)?,
-            missing: missing.into_iter().map(|key| !key).collect(),
-            pending_arrivals: pending_arrivals.unwrap_or_default(),
+            pending: self.set.buffer(guided::GUIDE_COUNTS).download(counted)?,
+            pending_shares: self.set.buffer(guided::GUIDE_SHARES).download(shares)?,
+            missing: self.missing()?.into_iter().map(|key| !key).collect(),
+            pending_arrivals: self.arrivals()?,
             ..self.learned.state()
         })
     }
@@ -338,35 +336,37 @@ impl GuideBuffers {
         let learned = Guide::resume(
             self.partition.regions.len(),
             self.budget.cells(self.partition.regions.len()),
-            self.table.size() as usize / 8,
+            self.slots,
             state,
             forget,
         );
         self.learned = self.with_bounces(learned, &state.arrivals, forget);
         self.clear_counts()?;
         let cells = self.learned.cell_count();
-        upload_start(&self.counts, &state.pending, cells * self.partition.regions.len())?;
-        upload_start(&self.shares, &state.pending_shares, cells * SHARE_WORDS)?;
-        if let Some(ArrivalBuffers { arrivals, .. }) = &self.arrivals {
-            upload_start(arrivals, &state.pending_arrivals, cells * ARRIVAL_DIRECTIONS)?;
+        let pending = start(&state.pending, cells * self.partition.regions.len());
+        self.upload_to(guided::GUIDE_COUNTS, pending)?;
+        self.upload_to(guided::GUIDE_SHARES, start(&state.pending_shares, cells * SHARE_WORDS))?;
+        if self.has_bounces {
+            let pending = start(&state.pending_arrivals, cells * ARRIVAL_DIRECTIONS);
+            self.upload_to(guided::GUIDE_ARRIVALS, pending)?;
         }
         let mut missing: Vec<u32> = state.missing.iter().map(|word| !word).collect();
         if missing.len() != self.missing_slots {
             missing.retain(|key| *key != CellKey::NONE.0);
             missing.truncate(self.missing_slots);
         }
-        self.missing.upload(bytemuck::cast_slice(&missing))?;
+        self.upload_to(guided::GUIDE_MISSING, &missing)?;
         self.upload()?;
         Ok(has_moved)
     }
 
     fn take_regions(&mut self, partition: Partition) -> Result<()> {
         let (regions, aliases) = partition.tables();
-        self.regions.upload(bytemuck::cast_slice(&regions))?;
-        self.aliases.upload(bytemuck::cast_slice(&aliases))?;
-        self.region_of_cell.upload(bytemuck::cast_slice(&partition.region_of_cell))?;
+        self.upload_to(guided::GUIDE_REGIONS, &regions)?;
+        self.upload_to(guided::GUIDE_ALIASES, &aliases)?;
+        self.upload_to(guided::GUIDE_REGION_OF_CELL, &partition.region_of_cell)?;
         self.layout.region_count = partition.regions.len() as u32;
-        self.parameters.upload(bytemuck::bytes_of(&self.layout))?;
+        self.upload_to(guided::GUIDE, &[self.layout])?;
         self.origin.regions = self.layout.region_count;
         self.partition = partition;
         self.is_split = true;
@@ -377,32 +377,35 @@ impl GuideBuffers {
     pub fn clear_counts(&self) -> Result<()> {
         let mut commands = Commands::begin(&self.device)?;
         // The rest belongs to no cell.
-        let used = self.learned.cell_count() * self.partition.regions.len();
-        commands.fill_start(&self.counts, COUNT_BYTES * used as u64, 0);
-        let used = self.learned.cell_count() * SHARE_WORDS;
-        commands.fill_start(&self.shares, 4 * used as u64, 0);
-        if let Some(arrivals) = &self.arrivals {
-            arrivals.record_clear(&mut commands, self.learned.cell_count());
+        let cells = self.learned.cell_count() as u64;
+        let mut clear = |binding, bytes_per_cell: u64| {
+            commands.fill_start(self.set.buffer(binding), bytes_per_cell * cells, 0);
+        };
+        clear(guided::GUIDE_COUNTS, COUNT_BYTES * self.partition.regions.len() as u64);
+        clear(guided::GUIDE_SHARES, 4 * SHARE_WORDS as u64);
+        if self.has_bounces {
+            clear(guided::GUIDE_ARRIVALS, ARRIVAL_BYTES * ARRIVAL_DIRECTIONS as u64);
         }
-        commands.fill(&self.missing, GUIDE_NO_KEY);
+        commands.fill(self.set.buffer(guided::GUIDE_MISSING), GUIDE_NO_KEY);
         commands.submit_and_wait()?;
         Ok(())
     }
 
     fn upload(&mut self) -> Result<()> {
         self.learned.write_snapshot(&self.partition, &mut self.snapshot);
-        if let Some(arrivals) = &self.arrivals {
-            arrivals.upload(&self.snapshot)?;
+        let Snapshot { table, entries, arriving, reflected, .. } = &self.snapshot;
+        if self.has_bounces {
+            self.upload_to(guided::GUIDE_ARRIVING, arriving)?;
+            self.upload_to(guided::GUIDE_REFLECTED, &reflected.units)?;
         }
-        let Snapshot { table, entries, .. } = &self.snapshot;
-        self.table.upload(bytemuck::cast_slice(table))?;
-        self.entries.upload(bytemuck::cast_slice(entries))
+        self.upload_to(guided::GUIDE_TABLE, table)?;
+        self.upload_to(guided::GUIDE_ENTRIES, entries)
     }
 }
 
-/// Uploads as many of the values as there is `room` for.
-fn upload_start<T: Pod>(buffer: &Buffer, values: &[T], room: usize) -> Result<()> {
-    buffer.upload(bytemuck::cast_slice(&values[..values.len().min(room)]))
+/// Returns as many of the values as there is `room` for.
+fn start<T>(values: &[T], room: usize) -> &[T] {
+    &values[..values.len().min(room)]
 }
 
 /// Makes cells about [`CELL_PIXELS`] wide in the picture, at most a twentieth of the scene.

@@ -15,7 +15,6 @@
 //! and `bounce_guided`.
 
 pub mod arm;
-mod arrival_buffers;
 mod arriving;
 mod budget;
 mod buffers;

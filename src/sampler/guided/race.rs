@@ -19,6 +19,7 @@ use crate::{
     gpu::DescriptorSet,
     pass::{BLOCK_PIXELS, Passes, Progress, Runner, Steps},
     shader::{
+        bindings::wave::PATHS,
         constants::{FILM_BLOCK, MEASURED_WAVE},
         structs::{PathState, Wave},
     },
@@ -164,7 +165,7 @@ impl Race<'_> {
                 let paths = (wave.pixel_count * SAMPLES) as usize;
                 ms[index] +=
                     times.values().sum::<f64>() / f64::from(blocks.count * BLOCK_PIXELS * SAMPLES);
-                let paths: Vec<PathState> = runner.waves.answers.paths.download(paths)?;
+                let paths: Vec<PathState> = runner.waves.set.buffer(PATHS).download(paths)?;
                 let filter = runner.scene.filter();
                 for first in (0..wave.pixel_count as usize).step_by(BLOCK_PIXELS as usize) {
                     let samples = (0..SAMPLES).zip(paths.chunks(wave.pixel_count as usize));

@@ -11,6 +11,7 @@ use crate::{
     pass::{Passes, Progress, RayReadback, Runner, film_buffers::position_in_film_order},
     sampler::regions::Partition,
     shader::{
+        bindings::wave,
         constants::NO_MATERIAL,
         rooms::guided::NOTHING_TO_LEARN,
         structs::{Hit, ShadowRay, Wave},
@@ -78,13 +79,13 @@ impl Guided {
         runner.run(self, wave, 1, false)?;
         runner.film().take_counters()?;
 
-        let waves = &runner.waves;
-        let hits: Vec<Hit> = waves.answers.hits.download(samples as usize)?;
+        let waves = &runner.waves.set;
+        let hits: Vec<Hit> = waves.buffer(wave::HITS).download(samples as usize)?;
         let is_hit = |hit: &&Hit| hit.material != NO_MATERIAL;
         let Some(first_hit) = hits.iter().find(is_hit) else { return Ok(None) };
         let count = (samples * per_group) as usize;
-        let shadow_rays: Vec<ShadowRay> = waves.answers.shadow_rays.download(count)?;
-        let visible: Vec<u32> = waves.answers.visibility.download(count)?;
+        let shadow_rays: Vec<ShadowRay> = waves.buffer(wave::SHADOW_RAYS).download(count)?;
+        let visible: Vec<u32> = waves.buffer(wave::VISIBILITY).download(count)?;
         let targets = if self.is_guided() {
             self.buffers.targets(count)?
         } else {

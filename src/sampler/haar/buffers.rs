@@ -49,29 +49,19 @@ impl NodeSize {
         let texels = self.quads().max(self.sums());
         PathDemand { bytes, texels, ..PathDemand::default() }
     }
-}
 
-/// Descriptor set 1 of `haar`.
-pub struct NodeBuffers {
-    /// Descriptor set 1.
-    pub set: DescriptorSet,
-    /// Halves of the nodes, two words for each four.
-    pub nodes: Buffer,
-}
-
-impl NodeBuffers {
-    /// Uploads the tree, and allocates the nodes of `paths` paths. Fails if the device does or its
-    /// limits are exceeded.
-    pub fn new(device: &Arc<Device>, tree: &Tree, size: NodeSize, paths: u32) -> Result<Self> {
+    /// Uploads the tree, and allocates the nodes of `paths` paths: descriptor set 1. Fails if the device
+    /// does or its limits are exceeded.
+    pub fn set(self, device: &Arc<Device>, tree: &Tree, paths: u32) -> Result<DescriptorSet> {
         let paths = u64::from(paths);
-        let centres: Vec<[f32; 4]> = (0..1 << (2 * size.level))
-            .map(|node| node_centre(size.level, node).extend(0.0).to_array())
+        let centres: Vec<[f32; 4]> = (0..1 << (2 * self.level))
+            .map(|node| node_centre(self.level, node).extend(0.0).to_array())
             .collect();
         let tree = Buffer::texels_from_slice(device, "environment tree", &tree.nodes)?;
         let centres = Buffer::texels_from_slice(device, "node centres", &centres)?;
-        let nodes = Buffer::new(device, "product nodes", paths * size.quads() * 8)?;
-        let sums = Buffer::new(device, "node sums", paths * size.sums() * 16)?;
-        let cache = Buffer::new(device, "blocked directions", paths * size.cache_words() * 4)?;
+        let nodes = Buffer::new(device, "product nodes", paths * self.quads() * 8)?;
+        let sums = Buffer::new(device, "node sums", paths * self.sums() * 16)?;
+        let cache = Buffer::new(device, "blocked directions", paths * self.cache_words() * 4)?;
         let bound = [
             (haar::HAAR_TREE, &tree),
             (haar::HAAR_CENTRES, &centres),
@@ -81,7 +71,6 @@ impl NodeBuffers {
             (haar::HAAR_SUM_TEXELS, &sums),
             (haar::HAAR_CACHE, &cache),
         ];
-        let set = DescriptorSet::new(device, &haar::TABLE, &bound)?;
-        Ok(Self { set, nodes })
+        DescriptorSet::new(device, &haar::TABLE, &bound)
     }
 }

@@ -12,7 +12,7 @@ pub mod tree;
 
 use std::{collections::BTreeMap, time::Instant};
 
-pub use buffers::{NodeBuffers, NodeSize};
+pub use buffers::NodeSize;
 pub use parameters::HaarParameters;
 pub use steps::HaarSteps;
 use tree::Tree;
@@ -53,8 +53,8 @@ impl Room for HaarRoom {
         let (surfaces, shadow_rays) = (settings.surfaces, settings.shadow_rays);
         let steps = HaarSteps::new(parameters, tree.depth, surfaces, shadow_rays);
         let size = NodeSize::new(parameters, shadow_rays);
-        let nodes = NodeBuffers::new(&runner.device, &tree, size, runner.waves.capacity)?;
+        let set = Some(size.set(&runner.device, &tree, runner.waves.capacity)?);
         let host_ms = [("environment tree".to_owned(), tree_ms)].into();
-        Ok(Box::new(Unlearned { steps, set: Some(nodes.set), host_ms }))
+        Ok(Box::new(Unlearned { steps, set, host_ms }))
     }
 }

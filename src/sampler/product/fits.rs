@@ -31,7 +31,8 @@ pub struct FitSizes {
 
 /// SRBF tables of a scene.
 pub struct Fits {
-    buffers: [Buffer; 3],
+    /// The tables at their bindings.
+    pub bound: [(Binding, Buffer); 3],
     /// Numbers of lobes and views.
     pub sizes: FitSizes,
     /// Hash of each fit, by the name of its input.
@@ -117,20 +118,16 @@ impl Fits {
             .iter()
             .map(|lobe| exponents(lobe.axis, lobe.bandwidth, lobe.amplitude))
             .collect();
-        let buffers = [
-            Buffer::texels_from_slice(device, "environment lobes", &environment)?,
-            Buffer::texels_from_slice(device, "BRDF lobes", &lobes)?,
-            Buffer::texels_from_slice(device, "material lobes", &materials)?,
+        let texels = |name, words| Buffer::texels_from_slice(device, name, words);
+        let bound = [
+            (product::ENVIRONMENT_LOBES, texels("environment lobes", &environment)?),
+            (product::BRDF_LOBES, texels("BRDF lobes", &lobes)?),
+            (
+                product::MATERIAL_LOBES,
+                Buffer::texels_from_slice(device, "material lobes", &materials)?,
+            ),
         ];
-        Ok(Self { buffers, sizes, hashes, fit_ms })
-    }
-
-    /// Returns the tables with their bindings.
-    pub fn bindings(&self) -> Vec<(Binding, &Buffer)> {
-        [product::ENVIRONMENT_LOBES, product::BRDF_LOBES, product::MATERIAL_LOBES]
-            .into_iter()
-            .zip(&self.buffers)
-            .collect()
+        Ok(Self { bound, sizes, hashes, fit_ms })
     }
 }
 

@@ -41,14 +41,6 @@ impl LobeSize {
 pub struct LobeBuffers {
     /// Descriptor set 1.
     pub set: DescriptorSet,
-    /// Two words per lobe and path (`lobes.glsl`).
-    pub lobes: Buffer,
-    /// Number of lobes of each path.
-    pub counts: Buffer,
-    /// Masks of the lobes close to cached directions (`cache.glsl`).
-    pub close_lobes: Buffer,
-    /// Visibility caches: a head and its directions each.
-    pub caches: Buffer,
     /// The fits.
     pub(super) fits: Fits,
 }
@@ -63,22 +55,21 @@ impl LobeBuffers {
         let cache_words =
             if size.cache_capacity > 0 { 1 + u64::from(size.cache_capacity) } else { 0 };
         let lobes = make("product lobes", paths * kept, 8)?;
-        let counts = make("lobe counts", paths, 4)?;
         let sums = make("lobe sums", paths * kept.div_ceil(u64::from(LOBES_PER_SUM)), 4)?;
         let close_lobes = make("close lobes", paths * size.mask_words(), 4)?;
         let caches = Buffer::zeroed(device, "visibility caches", 4 * caches * cache_words)?;
-        let mut bound = fits.bindings();
+        let mut bound = fits.bound.to_vec();
         bound.extend([
-            (product::LOBES, &lobes),
-            (product::LOBE_TEXELS, &lobes),
-            (product::LOBE_COUNTS, &counts),
-            (product::LOBE_SUMS, &sums),
-            (product::LOBE_SUM_TEXELS, &sums),
-            (product::CLOSE_LOBES, &close_lobes),
-            (product::CLOSE_LOBE_TEXELS, &close_lobes),
-            (product::VISIBILITY_CACHE, &caches),
+            (product::LOBES, lobes.clone()),
+            (product::LOBE_TEXELS, lobes),
+            (product::LOBE_COUNTS, make("lobe counts", paths, 4)?),
+            (product::LOBE_SUMS, sums.clone()),
+            (product::LOBE_SUM_TEXELS, sums),
+            (product::CLOSE_LOBES, close_lobes.clone()),
+            (product::CLOSE_LOBE_TEXELS, close_lobes),
+            (product::VISIBILITY_CACHE, caches),
         ]);
         let set = DescriptorSet::new(device, &product::TABLE, &bound)?;
-        Ok(Self { set, lobes, counts, close_lobes, caches, fits })
+        Ok(Self { set, fits })
     }
 }

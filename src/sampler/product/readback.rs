@@ -5,11 +5,13 @@ use crate::{
     error::Result,
     math::octahedron,
     pass::{BLOCK_PIXELS, LobeReadback},
+    shader::rooms::product,
 };
 
 /// Number of lobes of the first path of the last wave. Fails if the device does.
 pub fn lobe_count(buffers: &LobeBuffers) -> Result<usize> {
-    Ok(buffers.counts.download::<u32>(1)?.first().map_or(0, |count| *count as usize))
+    let counts: Vec<u32> = buffers.set.buffer(product::LOBE_COUNTS).download(1)?;
+    Ok(counts[0] as usize)
 }
 
 /// Reads the lobes of the first path in a wave of one block: fills `lobes` on the first call, updates
@@ -24,7 +26,8 @@ pub fn read_lobes(
         return Ok(());
     }
     let stride = BLOCK_PIXELS as usize;
-    let words: Vec<[u32; 2]> = buffers.lobes.download((count - 1) * stride + 1)?;
+    let words: Vec<[u32; 2]> =
+        buffers.set.buffer(product::LOBES).download((count - 1) * stride + 1)?;
     let weight = |lobe: usize| f64::from(half(words[lobe * stride][1] >> 16)) * factors[lobe];
     let total: f64 = (0..count).map(weight).sum();
     let probability = |lobe: usize| if total > 0.0 { weight(lobe) / total } else { 0.0 };

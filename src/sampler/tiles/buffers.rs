@@ -18,8 +18,6 @@ pub struct TileBuffers {
     set: DescriptorSet,
     grid: SectorGrid,
     cache: TileCache,
-    counts: Buffer,
-    entries: Buffer,
 }
 
 impl TileBuffers {
@@ -32,26 +30,22 @@ impl TileBuffers {
         cache: TileCache,
     ) -> Result<Self> {
         let bytes = 8 * (grid.sectors() * cache.tiles()) as u64;
-        let counts = Buffer::new(device, "tile counts", bytes)?;
-        let entries = Buffer::new(device, "tile entries", bytes)?;
         let (regions, aliases) = partition.tables();
-        let regions = Buffer::texels_from_slice(device, "tiles", &regions)?;
-        let aliases = Buffer::texels_from_slice(device, "tile aliases", &aliases)?;
-        let of_cell = Buffer::texels_from_slice(device, "tile of cell", &partition.region_of_cell)?;
+        let of_cell = &partition.region_of_cell;
         let bound = [
-            (tiles::TILE_COUNTS, &counts),
-            (tiles::TILE_ENTRIES, &entries),
-            (tiles::TILE_REGIONS, &regions),
-            (tiles::TILE_ALIASES, &aliases),
-            (tiles::TILE_OF_CELL, &of_cell),
+            (tiles::TILE_COUNTS, Buffer::new(device, "tile counts", bytes)?),
+            (tiles::TILE_ENTRIES, Buffer::new(device, "tile entries", bytes)?),
+            (tiles::TILE_REGIONS, Buffer::texels_from_slice(device, "tiles", &regions)?),
+            (tiles::TILE_ALIASES, Buffer::texels_from_slice(device, "tile aliases", &aliases)?),
+            (tiles::TILE_OF_CELL, Buffer::texels_from_slice(device, "tile of cell", of_cell)?),
         ];
         let set = DescriptorSet::new(device, &tiles::TABLE, &bound)?;
-        Ok(Self { set, grid, cache, counts, entries })
+        Ok(Self { set, grid, cache })
     }
 
     /// Replaces the entries of all sectors. Fails if the device does.
     pub fn upload(&self, entries: &[Entry]) -> Result<()> {
-        self.entries.upload(bytemuck::cast_slice(entries))
+        self.set.buffer(tiles::TILE_ENTRIES).upload(bytemuck::cast_slice(entries))
     }
 }
 
@@ -63,12 +57,13 @@ impl Tables for TileBuffers {
     }
 
     fn forget(&self) -> Result<()> {
-        self.counts.clear()?;
+        self.set.buffer(tiles::TILE_COUNTS).clear()?;
         self.upload(&self.cache.untrained().repeat(self.grid.sectors()))
     }
 
     fn freeze(&self) -> Result<()> {
-        let counts = self.counts.download(self.grid.sectors() * self.cache.tiles())?;
+        let entries = self.grid.sectors() * self.cache.tiles();
+        let counts = self.set.buffer(tiles::TILE_COUNTS).download(entries)?;
         self.upload(&self.cache.learned(self.grid, &counts))
     }
 }

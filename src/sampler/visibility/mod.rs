@@ -23,6 +23,7 @@ use crate::{
     film::Aov,
     gpu::DescriptorSet,
     pass::{Passes, PathDemand, PixelReadback, Progress, Report, Runner, Steps, Technique},
+    shader::rooms::product as bindings,
 };
 
 pub(super) struct VisibilityRoom;
@@ -116,7 +117,10 @@ impl Technique for Visibility {
     }
 
     fn restart(&mut self, _runner: &mut Runner) -> Result<()> {
-        if self.keeps_caches() { self.lobes.caches.clear() } else { Ok(()) }
+        if self.keeps_caches() {
+            self.lobes.set.buffer(bindings::VISIBILITY_CACHE).clear()?;
+        }
+        Ok(())
     }
 
     fn check_resume(&self, samples: u32, progress: &Progress) -> Result<()> {

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::Visibility;
-use crate::{error::Result, math::octahedron, pass::BLOCK_PIXELS};
+use crate::{error::Result, math::octahedron, pass::BLOCK_PIXELS, shader::rooms::product};
 
 /// Head bit of a cache that holds the last ray of its hit; twin of `cache.glsl`.
 const CACHE_GROWN: u32 = 1 << 31;
@@ -13,14 +13,15 @@ impl Visibility {
     /// `weights.glsl`. Fails if the device does.
     pub(super) fn visibility_weights(&self, lobe_count: usize) -> Result<Vec<f64>> {
         let places = self.cache_places as usize;
-        let cache: Vec<u32> = self.lobes.caches.download(1 + places)?;
+        let cache: Vec<u32> =
+            self.lobes.set.buffer(product::VISIBILITY_CACHE).download(1 + places)?;
         // Weights do not yet include what the last ray taught.
         let recorded =
             (cache[0] & !CACHE_GROWN) as usize - usize::from(cache[0] & CACHE_GROWN != 0);
         let stride = BLOCK_PIXELS as usize;
         let words_per_mask = self.kept_lobes.div_ceil(32) as usize;
         let length = ((places + 1) * words_per_mask - 1) * stride + 1;
-        let masks: Vec<u32> = self.lobes.close_lobes.download(length)?;
+        let masks: Vec<u32> = self.lobes.set.buffer(product::CLOSE_LOBES).download(length)?;
         let weight = |lobe: usize| {
             let is_close = |entry: &usize| {
                 let word = entry % (places + 1) * words_per_mask + lobe / 32;
@@ -35,7 +36,8 @@ impl Visibility {
     /// Reads the first path's cached directions in world space, oldest first. Fails if the device does.
     pub(super) fn cached_directions(&self) -> Result<Vec<Vec3>> {
         let places = self.cache_places as usize;
-        let words: Vec<u32> = self.lobes.caches.download(1 + places)?;
+        let words: Vec<u32> =
+            self.lobes.set.buffer(product::VISIBILITY_CACHE).download(1 + places)?;
         let recorded = (words[0] & !CACHE_GROWN) as usize;
         let oldest = if recorded > places { recorded % places } else { 0 };
         let in_order = (0..recorded.min(places)).map(|i| words[1 + (oldest + i) % places]);
