@@ -23,17 +23,6 @@ use crate::{
 /// Digits of that hash in the file's name.
 const GUIDE_NAME_DIGITS: usize = 12;
 
-/// Steps in which a checkpoint is written, in their order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Step {
-    /// The guide appears.
-    Guide,
-    /// The checkpoint takes the place of the older one.
-    Checkpoint,
-    /// The older guide goes.
-    Removal,
-}
-
 /// Path of the guide with this hash: `image.checkpoint.exr` → `image.checkpoint.<hash>.guide`.
 fn guide_path(checkpoint: &Path, hash: &str) -> PathBuf {
     let digits: String = hash.chars().take(GUIDE_NAME_DIGITS).collect();
@@ -128,15 +117,6 @@ impl Encoded {
     /// every other, and after every failure, the older pair or the newer one is complete. Fails with
     /// [`Error::Io`] and the cause.
     pub(crate) fn write(&self, path: &Path) -> Result<()> {
-        self.write_in_steps(path, &mut |_| Ok(()))
-    }
-
-    /// [`Self::write`], which asks `before` each step whether to go on.
-    fn write_in_steps(
-        &self,
-        path: &Path,
-        before: &mut dyn FnMut(Step) -> Result<()>,
-    ) -> Result<()> {
         // Others that write this checkpoint would remove the guide before its checkpoint is there.
         let _lock = locked_folder(path);
         let Self { image, guide } = self;
@@ -146,13 +126,11 @@ impl Encoded {
             (guide, image.attributes.get(GUIDE_ATTRIBUTE))
         {
             let guide_path = guide_path(path, hash);
-            before(Step::Guide)?;
             let is_new = !guide_path.exists();
             write_atomically(&guide_path, |file| file.write_all(guide))?;
             kept = guide_path.file_name().map(ToOwned::to_owned);
             added = is_new.then_some(guide_path);
         }
-        before(Step::Checkpoint)?;
         if let Err(error) = image.write_exr_uncompressed(path) {
             // Without its checkpoint a guide only takes space, but the disk may fail after the renaming.
             let guide_of = |image: &Image| image.attributes.get(GUIDE_ATTRIBUTE).cloned();
@@ -163,7 +141,6 @@ impl Encoded {
             }
             return Err(error);
         }
-        before(Step::Removal)?;
         // The checkpoint is safe: a guide that stays behind does no harm.
         let remove_others = || {
             let others = guide_paths(path)?;
@@ -199,58 +176,24 @@ mod tests {
         checkpoint(samples).encode(Some(guide.to_vec()))
     }
 
-    /// Stops the second writing before each of its steps, as a killed process or a full disk does,
-    /// and within the first two, which leaves a part of a temporary file behind.
-    #[test]
-    fn a_complete_pair_exists_after_every_step() {
-        let pair = |samples: u32| (checkpoint(samples), format!("guide of {samples}").into_bytes());
-        for stop in [Step::Guide, Step::Checkpoint, Step::Removal] {
-            let folder = tempfile::tempdir().unwrap();
-            let path = folder.path().join("room.checkpoint.exr");
-            let write = |samples: u32, before: &mut dyn FnMut(Step) -> Result<()>| {
-                let (checkpoint, guide) = pair(samples);
-                checkpoint.encode(Some(guide)).write_in_steps(&path, before)
-            };
-            let read = || {
-                let (checkpoint, guide) = Checkpoint::read_with_guide(&path).unwrap();
-                (checkpoint, guide.unwrap().1)
-            };
-            write(4, &mut |_| Ok(())).unwrap();
-            assert_eq!(read(), pair(4));
-            fs::write(folder.path().join(".fenestra-1-part.tmp"), "part").unwrap();
-            let stopped = |step| if step == stop { Err(Error::Interrupted) } else { Ok(()) };
-            assert!(write(8, &mut { stopped }).is_err());
-            assert_eq!(read(), pair(if stop == Step::Removal { 8 } else { 4 }), "{stop:?}");
-            // The next writing removes what the stopped one left behind.
-            write(12, &mut |_| Ok(())).unwrap();
-            assert_eq!(read(), pair(12), "{stop:?}");
-            assert_eq!(guide_paths(&path).unwrap().len(), 1, "{stop:?}");
-            remove_checkpoint(&path).unwrap();
-            assert!(!path.exists() && guide_paths(&path).unwrap().is_empty());
-        }
-    }
-
-    /// The second writer comes when the guide of the first is there, its checkpoint not yet.
+    /// The second writer comes while the first has the folder.
     #[test]
     fn two_writers_leave_a_complete_pair() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("room.checkpoint.exr");
+        with_guide(4, b"first").write(&path).unwrap();
+        let first = locked_folder(&path).unwrap();
         std::thread::scope(|scope| {
-            let second = || with_guide(8, b"second").write(&path).unwrap();
-            let mut before = |step| {
-                if step == Step::Checkpoint {
-                    let writer = scope.spawn(second);
-                    let start = std::time::Instant::now();
-                    while !writer.is_finished() && start.elapsed().as_millis() < 100 {
-                        std::thread::yield_now();
-                    }
-                }
-                Ok(())
-            };
-            with_guide(4, b"first").write_in_steps(&path, &mut before).unwrap();
-            assert!(Checkpoint::read_with_guide(&path).unwrap().1.is_some());
+            let second = scope.spawn(|| with_guide(8, b"second").write(&path).unwrap());
+            std::thread::sleep(std::time::Duration::from_millis(100));
+            assert!(!second.is_finished());
+            assert_eq!(guide_paths(&path).unwrap().len(), 1);
+            drop(first);
         });
         assert_eq!(Checkpoint::read_with_guide(&path).unwrap().1.unwrap().1, b"second");
+        assert_eq!(guide_paths(&path).unwrap().len(), 1, "the older guide is removed");
+        remove_checkpoint(&path).unwrap();
+        assert!(!path.exists() && guide_paths(&path).unwrap().is_empty());
     }
 
     #[test]
