@@ -180,7 +180,8 @@ impl Answers {
             (bindings::SHADOW_RAY_TEXELS, &shadow_rays),
             (bindings::VISIBILITY, &visibility),
         ];
-        let scene = DescriptorSet::filled(device, &SCENE, &geometry.bindings(), &spare)?;
+        let own: Vec<_> = geometry.bound.iter().map(|(at, buffer)| (*at, buffer)).collect();
+        let scene = DescriptorSet::filled(device, &SCENE, &own, &spare)?;
         let path_set = DescriptorSet::filled(device, &WAVE, &path_buffers, &spare)?;
         let shadow_set = DescriptorSet::filled(device, &WAVE, &shadow_buffers, &spare)?;
         let film = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &counters)])?;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{
     host_tracer::HostTracer,
     kernel::{Domain, Kernel, Question},
-    passages::{Passages, PassingSurfaces},
+    passages::{Passages, TRIANGLE_PAGES},
     surfaces::Surfaces,
 };
 use crate::{
@@ -21,17 +21,12 @@ use crate::{
     },
 };
 
-const PAGES: [Binding; MAX_TRIANGLE_PAGES] =
-    [scene::TRIANGLES_0, scene::TRIANGLES_1, scene::TRIANGLES_2, scene::TRIANGLES_3];
-
 /// Tree and triangles on the device.
 pub struct GeometryBuffers {
-    nodes: Buffer,
+    /// The buffers at their bindings in the scene set. Missing pages repeat the first.
+    pub bound: Vec<(Binding, Buffer)>,
     pages: Vec<Buffer>,
-    materials: Buffer,
-    instances: Buffer,
-    page_shift: u32,
-    is_instanced: bool,
+    traversal: Traversal,
     host_tracer: Option<HostTracer>,
 }
 
@@ -48,7 +43,7 @@ impl GeometryBuffers {
     /// Copies `accel` to the device; shaders no longer need the original. Fails if memory or a
     /// limit does not suffice.
     pub fn new(device: &Arc<Device>, accel: &Accel) -> Result<Self> {
-        let pages = accel
+        let pages: Vec<Buffer> = accel
             .triangle_pages
             .iter()
             .enumerate()
@@ -56,19 +51,26 @@ impl GeometryBuffers {
                 Buffer::texels_from_slice(device, &format!("triangles {index}"), page)
             })
             .collect::<Result<_>>()?;
-        Ok(Self {
-            nodes: Buffer::texels_from_slice(device, "BVH nodes", &accel.nodes)?,
-            pages,
-            materials: Buffer::from_slice(device, "triangle materials", &accel.triangle_materials)?,
-            instances: Buffer::texels_from_slice(device, "instances", &accel.instances)?,
+        let materials =
+            Buffer::from_slice(device, "triangle materials", &accel.triangle_materials)?;
+        let mut bound = vec![
+            (scene::BVH_NODES, Buffer::texels_from_slice(device, "BVH nodes", &accel.nodes)?),
+            (scene::TRIANGLE_MATERIALS, materials),
+            (scene::INSTANCES, Buffer::texels_from_slice(device, "instances", &accel.instances)?),
+        ];
+        let page = |(index, binding)| (binding, pages.get(index).unwrap_or(&pages[0]).clone());
+        bound.extend(TRIANGLE_PAGES.into_iter().enumerate().map(page));
+        let traversal = Traversal {
+            page_count: pages.len() as u32,
             page_shift: accel.page_shift,
             is_instanced: accel.is_instanced(),
-            host_tracer: None,
-        })
+            is_on_host: false,
+        };
+        Ok(Self { bound, pages, traversal, host_tracer: None })
     }
 
-    /// Lets the host trace where the device is opened for that; `passing` are the surfaces of a scene in
-    /// which light may pass some. Where memory does not suffice for the host's tree, the device traces,
+    /// Lets the host trace where the device is opened for that; `passages` are those of light, in a scene in
+    /// which it may pass some surfaces. Where memory does not suffice for the host's tree, the device traces,
     /// unless the host was asked for.
     ///
     /// # Errors
@@ -77,19 +79,15 @@ impl GeometryBuffers {
         self,
         device: &Device,
         accel: &Accel,
-        passing: Option<PassingSurfaces>,
+        passages: Option<Passages>,
     ) -> Result<Self> {
         let Some(embree) = device.embree() else { return Ok(self) };
-        let passages = passing.map(|surfaces| Passages {
-            pages: self.pages.clone(),
-            page_shift: self.page_shift,
-            triangle_materials: self.materials.clone(),
-            instances: accel.instances.clone(),
-            surfaces,
-        });
         let must_trace = device.must_trace_on_host();
         match HostTracer::new(embree, accel, &self.pages, passages, must_trace) {
-            Ok(tracer) => Ok(Self { host_tracer: Some(tracer), ..self }),
+            Ok(tracer) => {
+                let traversal = Traversal { is_on_host: true, ..self.traversal };
+                Ok(Self { traversal, host_tracer: Some(tracer), ..self })
+            }
             Err(Error::Memory { message, .. }) if !must_trace => {
                 log::warn!("{message}; the device traces");
                 Ok(self)
@@ -103,26 +101,9 @@ impl GeometryBuffers {
         self.host_tracer.as_ref()
     }
 
-    /// Returns the buffers with their bindings in the scene set. Missing pages repeat the first.
-    pub fn bindings(&self) -> Vec<(Binding, &Buffer)> {
-        let page = |(index, binding)| (binding, self.pages.get(index).unwrap_or(&self.pages[0]));
-        let mut bindings = vec![
-            (scene::BVH_NODES, &self.nodes),
-            (scene::TRIANGLE_MATERIALS, &self.materials),
-            (scene::INSTANCES, &self.instances),
-        ];
-        bindings.extend(PAGES.into_iter().enumerate().map(page));
-        bindings
-    }
-
     /// Returns the specialization of the passes that traverse this geometry.
     pub fn traversal(&self) -> Traversal {
-        Traversal {
-            page_count: self.pages.len() as u32,
-            page_shift: self.page_shift,
-            is_instanced: self.is_instanced,
-            is_on_host: self.host_tracer.is_some(),
-        }
+        self.traversal
     }
 }
 

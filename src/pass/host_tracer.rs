@@ -101,7 +101,7 @@ impl HostTracer {
     ) -> Result<u32> {
         let paths = ListedPaths::new(wave, waves)?;
         let words = |binding| waves.buffer(binding).words();
-        let passages = self.passages.as_ref().map(Passages::open).transpose()?;
+        let passages = self.passages.as_ref().map(|passages| passages.open(scene)).transpose()?;
         let rays = Rays { tree: &self.tree, passages: passages.as_ref() };
         match question {
             Question::Closest => {

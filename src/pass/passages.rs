@@ -11,16 +11,17 @@ use glam::Vec3;
 use super::{
     film_buffers::BLOCK_PIXELS,
     surfaces,
-    texture_buffers::{TextureAccess, TextureBuffers},
+    texture_buffers::{ATTRIBUTE_PAGES, TEXTURE_PAGES, TextureAccess},
 };
 use crate::{
     accel::{
+        Accel, MAX_TRIANGLE_PAGES,
         instances::Record,
         traverse::{edge_functions, placed},
     },
     brdf::fresnel::{pane_reflectance, pane_transmittance},
     error::Result,
-    gpu::{Buffer, embree_scene::Meeting},
+    gpu::{DescriptorSet, embree_scene::Meeting},
     math::{
         colour::luminance,
         frame::frame_from_normal,
@@ -28,6 +29,7 @@ use crate::{
     },
     scene::material,
     shader::{
+        bindings::{Binding, scene},
         constants::{
             ATTRIBUTE_FIRST_UVS, ATTRIBUTE_SECOND_UVS, DIMENSION_PASSAGE, DIMENSION_VERTEX,
             DIMENSIONS_PER_VERTEX, FILM_BLOCK, MATERIAL_THIN_DIELECTRIC,
@@ -40,69 +42,58 @@ use crate::{
     },
 };
 
+pub(super) const TRIANGLE_PAGES: [Binding; MAX_TRIANGLE_PAGES] =
+    [scene::TRIANGLES_0, scene::TRIANGLES_1, scene::TRIANGLES_2, scene::TRIANGLES_3];
 /// Words of a vertex in the buffers of triangles.
 const VERTEX_WORDS: usize = 4;
 
 /// Surfaces of a scene, for the host to know what light passes them.
-pub struct PassingSurfaces {
+pub struct Passages {
     materials: Vec<Material>,
     surfaces: Vec<MaterialSurface>,
     uses: Vec<TextureUse>,
-    textures: Vec<Buffer>,
-    attributes: Vec<Buffer>,
     access: TextureAccess,
     passes: Vec<bool>,
+    instances: Vec<Record>,
+    /// Base-2 logarithm of the triangles per page, three vertices each.
+    page_shift: u32,
 }
 
-impl PassingSurfaces {
+impl Passages {
     /// Takes the surfaces of `of`, whose `materials` and `tables` are those of the device; none if light
     /// passes nothing.
     pub(super) fn new(
         of: &[material::Material],
         materials: &[Material],
         tables: &SurfaceTables,
-        textures: &TextureBuffers,
+        access: TextureAccess,
+        accel: &Accel,
     ) -> Option<Self> {
         let passes: Vec<bool> = of.iter().map(surfaces::passes).collect();
-        let [texture_pages, attribute_pages] = textures.pages();
         passes.contains(&true).then(|| Self {
             materials: materials.to_vec(),
             surfaces: tables.surfaces.clone(),
             uses: tables.textures.uses.clone(),
-            textures: texture_pages.to_vec(),
-            attributes: attribute_pages.to_vec(),
-            access: textures.access,
+            access,
             passes,
+            instances: accel.instances.clone(),
+            page_shift: accel.page_shift,
         })
     }
-}
 
-/// Triangles of a scene and their surfaces.
-pub(super) struct Passages {
-    /// Triangles, three vertices each, in pages of `1 << page_shift`.
-    pub(super) pages: Vec<Buffer>,
-    pub(super) page_shift: u32,
-    pub(super) triangle_materials: Buffer,
-    pub(super) instances: Vec<Record>,
-    pub(super) surfaces: PassingSurfaces,
-}
-
-impl Passages {
     /// Tests whether light may pass a surface of this material.
     pub(super) fn may_pass(&self, material: u32) -> bool {
-        self.surfaces.passes[material as usize]
+        self.passes[material as usize]
     }
 
-    /// Looks into the buffers. Fails if the host does not share the memory of a buffer.
-    pub(super) fn open(&self) -> Result<OpenPassages<'_>> {
-        let of = &self.surfaces;
-        let access = of.access;
+    /// Looks into the buffers of the scene's set. Fails if the host does not share the memory of one.
+    pub(super) fn open<'a>(&'a self, set: &'a DescriptorSet) -> Result<OpenPassages<'a>> {
         Ok(OpenPassages {
             of: self,
-            triangles: Pages::open(&self.pages, self.page_shift)?,
-            triangle_materials: self.triangle_materials.words()?,
-            textures: Pages::open(&of.textures, access.page_shift)?,
-            attributes: Pages::open(&of.attributes, access.page_shift)?,
+            triangles: Pages::open(set, TRIANGLE_PAGES, self.page_shift)?,
+            triangle_materials: set.buffer(scene::TRIANGLE_MATERIALS).words()?,
+            textures: Pages::open(set, TEXTURE_PAGES, self.access.page_shift)?,
+            attributes: Pages::open(set, ATTRIBUTE_PAGES, self.access.page_shift)?,
         })
     }
 }
@@ -114,8 +105,9 @@ struct Pages<'a> {
 }
 
 impl<'a> Pages<'a> {
-    fn open(buffers: &'a [Buffer], shift: u32) -> Result<Self> {
-        Ok(Self { pages: buffers.iter().map(Buffer::words).collect::<Result<_>>()?, shift })
+    fn open(set: &'a DescriptorSet, pages: [Binding; 4], shift: u32) -> Result<Self> {
+        let pages = pages.iter().map(|page| set.buffer(*page).words());
+        Ok(Self { pages: pages.collect::<Result<_>>()?, shift })
     }
 
     /// Page of an element, and its index there.
@@ -151,8 +143,8 @@ pub(super) struct OpenPassages<'a> {
 impl OpenPassages<'_> {
     /// Light at the point where a ray meets a surface.
     pub(super) fn passing(&self, met: &Meeting) -> Passing {
-        let Passages { instances, surfaces: of, .. } = self.of;
-        let instance = instances.get(met.instance as usize);
+        let of = self.of;
+        let instance = of.instances.get(met.instance as usize);
         let (page, triangle) = self.triangles.find(met.triangle as usize);
         let frame = frame_from_normal(met.direction);
         let local = [0, 1, 2].map(|corner| {

@@ -9,7 +9,7 @@ use super::{
     lamp_cells::LampCells,
     lamps::LampTables,
     mattes::Mattes,
-    passages::PassingSurfaces,
+    passages::Passages,
     surfaces::{self, Surfaces},
     texture_buffers::TextureBuffers,
 };
@@ -24,7 +24,7 @@ use crate::{
         light_group::LightGroups,
     },
     shader::{
-        bindings::{Binding, SCENE, scene as bindings},
+        bindings::{SCENE, scene as bindings},
         constants::{FILTER_BOX, FILTER_GAUSSIAN, SURFACES_INSTANCED, SURFACES_LAMP_CELLS},
         structs::SceneParameters,
     },
@@ -88,11 +88,11 @@ impl SceneBuffers {
         let textures = TextureBuffers::new(device, &surface_tables, &attributes)?;
         drop(attributes);
         let tables = MaterialTables::new(&scene.materials)?;
-        let passing =
-            PassingSurfaces::new(&scene.materials, &tables.materials, &surface_tables, &textures);
+        let (materials, access) = (&tables.materials, textures.access);
+        let passages = Passages::new(&scene.materials, materials, &surface_tables, access, built);
         drop(surface_tables);
         let geometry =
-            GeometryBuffers::new(device, built)?.traced_by_host(device, built, passing)?;
+            GeometryBuffers::new(device, built)?.traced_by_host(device, built, passages)?;
         let mattes = Mattes::new(scene, built);
         drop(accel);
         let mut host_ms = BTreeMap::new();
@@ -139,7 +139,7 @@ impl SceneBuffers {
             ..parameters(scene, map, total, window)
         };
         let words = |name, words: &[u32]| Buffer::from_slice(device, name, words);
-        let own: [(Binding, Buffer); 18] = [
+        let mut bound = vec![
             (bindings::PARAMETERS, Buffer::from_slice(device, "parameters", &[parameters])?),
             (bindings::ENVIRONMENT_TEXELS, texels),
             (bindings::ENVIRONMENT_ROWS, rows),
@@ -162,8 +162,8 @@ impl SceneBuffers {
             (bindings::BRDF_TABLE, brdf_table.clone()),
             (bindings::BRDF_CELLS, brdf_table),
         ];
-        let own = own.iter().map(|(binding, buffer)| (*binding, buffer));
-        let bound: Vec<_> = own.chain(geometry.bindings()).chain(textures.bindings()).collect();
+        bound.extend_from_slice(&geometry.bound);
+        bound.extend(textures.bound);
         let set = DescriptorSet::new(device, &SCENE, &bound)?;
         host_ms.insert("upload".to_owned(), start.elapsed().as_secs_f64() * 1e3);
         Ok(Self { set, geometry, parameters, surfaces, window, light_groups, host_ms })

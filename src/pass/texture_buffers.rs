@@ -19,13 +19,13 @@ use crate::{
     },
 };
 
-const TEXTURE_PAGES: [Binding; MAX_PAGES] = [
+pub(super) const TEXTURE_PAGES: [Binding; MAX_PAGES] = [
     scene::TEXTURE_WORDS_0,
     scene::TEXTURE_WORDS_1,
     scene::TEXTURE_WORDS_2,
     scene::TEXTURE_WORDS_3,
 ];
-const ATTRIBUTE_PAGES: [Binding; MAX_PAGES] = [
+pub(super) const ATTRIBUTE_PAGES: [Binding; MAX_PAGES] = [
     scene::TRIANGLE_ATTRIBUTES_0,
     scene::TRIANGLE_ATTRIBUTES_1,
     scene::TRIANGLE_ATTRIBUTES_2,
@@ -35,10 +35,8 @@ const ATTRIBUTE_PAGES: [Binding; MAX_PAGES] = [
 /// Buffers that shaders read by `glsl/include/texture.glsl`. A scene without textures has buffers of one
 /// element, which no shader reads.
 pub(crate) struct TextureBuffers {
-    texture_pages: Vec<Buffer>,
-    attribute_pages: Vec<Buffer>,
-    uses: Buffer,
-    surfaces: Buffer,
+    /// The buffers at their bindings in the scene set. Missing pages repeat the first.
+    pub(super) bound: Vec<(Binding, Buffer)>,
     /// Specialization of the passes that read textures.
     pub(crate) access: TextureAccess,
 }
@@ -83,33 +81,16 @@ impl TextureBuffers {
             page_shift: shift,
             attributes: attributes.bits,
         };
-        Ok(Self {
-            texture_pages,
-            attribute_pages,
-            uses: Buffer::from_slice(device, "texture uses", &tables.textures.uses)?,
-            surfaces: Buffer::from_slice(device, "material surfaces", &tables.surfaces)?,
-            access,
-        })
-    }
-
-    /// Returns the buffers with their bindings in the scene set. Missing pages repeat the first.
-    pub(crate) fn bindings(&self) -> Vec<(Binding, &Buffer)> {
-        let mut bindings = vec![
-            (scene::TEXTURE_USE_TEXELS, &self.uses),
-            (scene::MATERIAL_SURFACE_TEXELS, &self.surfaces),
-        ];
-        for (names, pages) in
-            [(TEXTURE_PAGES, &self.texture_pages), (ATTRIBUTE_PAGES, &self.attribute_pages)]
+        let uses = Buffer::from_slice(device, "texture uses", &tables.textures.uses)?;
+        let surfaces = Buffer::from_slice(device, "material surfaces", &tables.surfaces)?;
+        let mut bound =
+            vec![(scene::TEXTURE_USE_TEXELS, uses), (scene::MATERIAL_SURFACE_TEXELS, surfaces)];
+        for (names, pages) in [(TEXTURE_PAGES, &texture_pages), (ATTRIBUTE_PAGES, &attribute_pages)]
         {
-            let page = |(index, name)| (name, pages.get(index).unwrap_or(&pages[0]));
-            bindings.extend(names.into_iter().enumerate().map(page));
+            let page = |(index, name)| (name, pages.get(index).unwrap_or(&pages[0]).clone());
+            bound.extend(names.into_iter().enumerate().map(page));
         }
-        bindings
-    }
-
-    /// Texels, and attributes of triangles.
-    pub(crate) fn pages(&self) -> [&[Buffer]; 2] {
-        [&self.texture_pages, &self.attribute_pages]
+        Ok(Self { bound, access })
     }
 }
 

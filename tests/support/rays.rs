@@ -153,7 +153,8 @@ impl OnDevice {
     fn with(geometry: GeometryBuffers) -> Self {
         let device = super::device();
         let spare = Buffer::zeroed(device, "spare", 256).unwrap();
-        let scene = set(&SCENE, &geometry.bindings(), &spare);
+        let own: Vec<_> = geometry.bound.iter().map(|(at, buffer)| (*at, buffer)).collect();
+        let scene = set(&SCENE, &own, &spare);
         let counters = Buffer::zeroed(device, "counters", size_of::<Counters>() as u64).unwrap();
         let film = DescriptorSet::new(device, &FILM, &[(film::COUNTERS, &counters)]).unwrap();
         Self { geometry, spare, scene, counters, film }
