@@ -20,7 +20,6 @@ pub mod roulette;
 pub mod runner;
 pub mod scene_buffers;
 pub mod sharing;
-pub(crate) mod sharing_buffers;
 pub mod steps;
 pub mod surfaces;
 pub mod technique;

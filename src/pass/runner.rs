@@ -17,7 +17,7 @@ use super::{
     order::{FEATURES, PassSettings, PathLists, wave_order},
     recording::{Recording, add_times},
     scene_buffers::SceneBuffers,
-    sharing_buffers::{sharing_demand, sharing_set},
+    sharing::{sharing_demand, sharing_set},
     steps::{Passes, PathDemand, SHADOW_RAYS_PER_GROUP, Steps},
     totals::Totals,
     wave_buffers::WaveBuffers,
