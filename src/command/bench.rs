@@ -185,7 +185,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         all_passes_mrays: RateSpread::of(mrays),
         shadow_pass_share: RateSpread::of(shares),
         pass_ms,
-        compile_ms: renderer.compile_ms().clone(),
+        compile_ms: renderer.runner.compile_ms.clone(),
         host_ms,
         buffer_bytes: renderer.buffer_bytes(),
     };

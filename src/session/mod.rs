@@ -4,9 +4,6 @@
 //! met, [`Event`]s to an [`Observer`], checkpoints, resume, metadata and statistics. The commands
 //! `render`, `study` and `view` and `docs/examples` are programs around it.
 
-mod figures;
-mod guide;
-mod look;
 pub mod pixel;
 mod progress;
 mod rate;
@@ -16,9 +13,9 @@ mod settings;
 mod statistics;
 mod stop;
 
-pub use figures::Figures;
 pub use renderer::Renderer;
 pub(crate) use run::describe;
 pub use run::{Event, Observer, Session};
 pub use settings::{DEFAULT_DEPTH, Settings, parse_size, traced_window, window_of};
+pub use statistics::Figures;
 pub use stop::{Flag, Limit, Quality, Rules, Standing, StopReason, parse_duration};

@@ -1,19 +1,21 @@
 //! Progressive rendering of a scene on a device.
 
-use std::{any::Any, collections::BTreeMap, sync::Arc};
+use std::{any::Any, collections::BTreeMap, io::Write, path::Path, sync::Arc};
 
 use super::{Settings, traced_window, window_of};
 use crate::{
     error::{Error, Result},
+    files::{self, write_atomically},
     film::{Aov, Sums, reconstruction::shared_offset, sums::Ahead},
-    gpu::{Device, PassTimes},
+    gpu::Device,
     pass::{
-        PassSettings, Progress, Report, Runner, SceneBuffers, Schedule, Technique, Totals,
+        PassSettings, Progress, Report, Runner, Saved, SceneBuffers, Schedule, Technique, Totals,
+        Watch,
         film_buffers::{BLOCK_PIXELS, aov_bits, check_memory},
         wave_buffers::most_paths,
     },
     sampler::Context,
-    scene::{Filter, Scene, light_group::LightGroups},
+    scene::{Camera, Scene, light_group::LightGroups},
     shader::{constants::MOST_LIGHT_GROUPS, structs::Wave},
 };
 
@@ -41,10 +43,11 @@ fn light_group_count(settings: &Settings, groups: &LightGroups) -> Result<u32> {
 
 /// A scene on a device, and the film it is rendered to.
 pub struct Renderer {
-    pub(super) runner: Runner,
+    pub(crate) runner: Runner,
     pub(super) technique: Box<dyn Technique>,
     pub(super) settings: Settings,
-    pub(super) film_size: [u32; 2],
+    /// Width and height of the film in use, pixels.
+    pub(crate) film_size: [u32; 2],
     pub(super) sample_count: u32,
     /// Sweep that was stopped on its way.
     pub(super) ahead: Ahead,
@@ -165,7 +168,8 @@ impl Renderer {
             let done = self.runner.sweep(self.technique.as_ref(), wave, pixels)?;
             if done < pixels {
                 let blocks = before.blocks + done / BLOCK_PIXELS;
-                let offset = shared_offset(self.filter(), wave.first_sample, wave.seed);
+                let offset =
+                    shared_offset(self.runner.scene.filter(), wave.first_sample, wave.seed);
                 self.ahead = Ahead { blocks, offset };
             } else {
                 self.sample_count += together;
@@ -241,11 +245,6 @@ impl Renderer {
         self.ahead
     }
 
-    /// Filter of the film.
-    pub(crate) fn filter(&self) -> Filter {
-        self.runner.scene.filter()
-    }
-
     /// Samples of every pixel in the film.
     pub fn sample_count(&self) -> u32 {
         self.sample_count
@@ -259,11 +258,6 @@ impl Renderer {
     /// Counts and device times so far.
     pub fn totals(&self) -> &Totals {
         self.runner.totals()
-    }
-
-    /// Milliseconds that the first use of each pass took, and the creation of all as `pipelines`.
-    pub fn compile_ms(&self) -> &PassTimes {
-        &self.runner.compile_ms
     }
 
     /// Figures of the technique.
@@ -295,5 +289,69 @@ impl Renderer {
         }
         let (film_size, sample_count, ahead) = (self.film_size, self.sample_count, self.ahead);
         Ok(Sums { film_size, sample_count, ahead, ..sums })
+    }
+
+    /// Empties the film to render through another camera, on a film of `size` pixels: the one that the
+    /// renderer was made for, or a smaller one. `seed` must be new: what was learned stays, and numbers
+    /// that it was learned from must not meet it again. What was counted since the last rebuild is used
+    /// at once if `learns`, which takes time, else later. Fails if the device does.
+    ///
+    /// # Panics
+    /// If the renderer has a crop window, or the film is larger than that.
+    pub fn look(&mut self, camera: &Camera, size: [u32; 2], seed: u32, learns: bool) -> Result<()> {
+        assert!(self.settings.window.is_none(), "a camera moves with the whole film");
+        self.runner.look(camera, size)?;
+        self.technique.look(&mut self.runner, learns)?;
+        self.settings.seed = seed;
+        self.film_size = size;
+        self.sample_count = 0;
+        self.ahead = Ahead::default();
+        Ok(())
+    }
+
+    /// Calls `watch` after waves from now on. Where it returns true, [`Renderer::render_pass`] returns
+    /// early, and some pixels may have more samples than others.
+    pub fn set_watch(&mut self, watch: Watch) {
+        self.runner.set_watch(watch);
+    }
+
+    /// True if the watch has stopped a pass since [`Renderer::look`].
+    pub fn is_stopped(&self) -> bool {
+        self.runner.is_stopped()
+    }
+
+    /// Returns what the sampler has learned, as the content of a file; `None` for samplers that learn
+    /// nothing. Fails if the device does.
+    pub fn guide(&self) -> Result<Option<Vec<u8>>> {
+        self.technique.save(self.sample_count)
+    }
+
+    /// Continues from what an earlier renderer learned, as [`Technique::load`].
+    pub fn take_guide(&mut self, saved: Saved<'_>) -> Result<bool> {
+        let progress = self.progress();
+        self.technique.load(&mut self.runner, &progress, saved)
+    }
+
+    /// Starts from the guide of an earlier render, such as another frame of an animation. Warns if it was
+    /// learned in another geometry.
+    ///
+    /// # Errors
+    /// A file that cannot be read or belongs to another environment; a failing device.
+    pub fn load_guide(&mut self, path: &Path) -> Result<()> {
+        let bytes = files::read(path)?;
+        if self.take_guide(Saved { path, bytes: &bytes, continues: false })? {
+            let path = path.display();
+            log::warn!("{path} was learned in another geometry: most of it counts no more");
+        }
+        Ok(())
+    }
+
+    /// Writes the guide, if the sampler learns one.
+    ///
+    /// # Errors
+    /// A failing device or disk.
+    pub fn save_guide(&self, path: &Path) -> Result<()> {
+        let write = |bytes: Vec<u8>| write_atomically(path, |file| file.write_all(&bytes));
+        self.guide()?.map_or(Ok(()), write)
     }
 }

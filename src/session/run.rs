@@ -353,7 +353,7 @@ impl Session {
     /// Removes the checkpoint again if it leaves too little of the disk for the image.
     fn leave_room_beside(&mut self, path: &Path) {
         let settings = self.renderer.settings();
-        let [width, height] = self.renderer.film_size().map(u64::from);
+        let [width, height] = self.renderer.film_size.map(u64::from);
         let layers = 1 + settings.aovs.len() as u64;
         let image_bytes = width * height * 12 * layers + IMAGE_BESIDES_PIXELS;
         if free_bytes(path).is_some_and(|free| free < image_bytes as f64) {

@@ -120,7 +120,7 @@ impl Study<'_> {
                 session.restart(seed)?;
             }
         }
-        let [width, height] = session.renderer.film_size().map(f64::from);
+        let [width, height] = session.renderer.film_size.map(f64::from);
         self.watch.expect(-width * height * f64::from(session.renderer.sample_count()), 0.0);
         let checkpoints = Some((checkpoint.clone(), CHECKPOINT_INTERVAL));
         let rules = Rules { samples: Some(count), checkpoints, ..Rules::default() };

@@ -1,8 +1,8 @@
 //! Comparisons of samplers as experiments.
 //!
 //! A study file and the command line ([`mod@file`], [`plan`], [`contender`]) → runs against a
-//! reference in two halves ([`engine`], [`job`], [`mod@reference`], [`reference_check`],
-//! [`halves`], [`own_errors`], [`surfaces`], [`overhead`]), each kept as one of the [`runs`] in the report
+//! reference in two halves ([`engine`], [`mod@reference`], [`reference_check`],
+//! [`halves`], [`surfaces`], [`overhead`]), each kept as one of the [`runs`] in the report
 //! [`folder`] → figures over the seeds ([`summary`], [`quality`], [`statistics`]) → `results.json`,
 //! `results.csv` ([`results`]) and the page ([`report`]). [`metrics`] defines the errors.
 
@@ -13,10 +13,8 @@ pub mod file;
 mod finished;
 pub(crate) mod folder;
 mod halves;
-mod job;
 pub mod metrics;
 mod overhead;
-mod own_errors;
 pub mod plan;
 mod quality;
 mod reference;

@@ -11,7 +11,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{contender::Contender, own_errors::JUDGED_FROM};
+use super::contender::Contender;
 use crate::{
     error::{Error, Result},
     files::extension,
@@ -19,6 +19,8 @@ use crate::{
     session::DEFAULT_DEPTH,
 };
 
+/// A run is judged if its mean squared error is at least this many times the reference's own.
+pub(crate) const JUDGED_FROM: f64 = 4.0;
 /// Samples per pixel if neither samples nor time are given.
 const DEFAULT_SPP: u32 = 64;
 /// Ratio of the reference's samples to the largest number of samples compared.

@@ -7,8 +7,7 @@
 use serde::Serialize;
 
 use super::{
-    own_errors::JUDGED_FROM,
-    plan::Plan,
+    plan::{JUDGED_FROM, Plan},
     runs::{Measurement, Run, StudiedScene},
     statistics::median_interval,
 };
@@ -221,8 +220,8 @@ mod tests {
     use crate::session::Figures;
     use crate::study::{
         metrics::Errors,
-        own_errors::OwnErrors,
         plan::{Description, Options, Rule},
+        reference::OwnErrors,
         runs::Conditions,
     };
 

@@ -7,9 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::{
     contender::Contender,
     metrics::{Errors, Metrics},
-    own_errors::{OwnErrors, OwnParts, is_judged},
     plan::Rule,
-    reference::Reference,
+    reference::{OwnErrors, OwnParts, Reference, is_judged},
     reference_check::ReferenceCheck,
     statistics::mean_standard_error,
     surfaces::{Parts, Surfaces},
@@ -142,7 +141,10 @@ impl Measurement {
         let metrics = Metrics::of_halves(&picture, &reference.first, &reference.second)?;
         let variances = (0..sums.pixel_count()).map(|pixel| sums.variance_of_mean(pixel));
         let error = (sums.sample_count > 1).then(|| {
-            mean_standard_error(variances.map(|v| v.map(f64::sqrt)), session.renderer.filter())
+            mean_standard_error(
+                variances.map(|v| v.map(f64::sqrt)),
+                session.renderer.runner.scene.filter(),
+            )
         });
         let totals = session.renderer.totals();
         let own = &reference.own;

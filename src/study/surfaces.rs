@@ -6,7 +6,9 @@
 //! the pixel counts as surface.
 
 use super::{
-    folder::Folder, metrics::parts::PartErrors, own_errors::OwnParts, reference::Reference,
+    folder::Folder,
+    metrics::parts::PartErrors,
+    reference::{OwnParts, Reference},
 };
 use crate::{
     error::Result,

@@ -76,7 +76,7 @@ impl<'a> Watch<'a> {
         by_time: bool,
     ) -> Result<()> {
         self.check()?;
-        let pixels = session.renderer.film_size().map(f64::from);
+        let pixels = session.renderer.film_size.map(f64::from);
         let mut run = WatchedRun { watch: self, pixels: pixels[0] * pixels[1], by_time };
         match session.run(rules, &mut run)? {
             StopReason::Interrupt if session.met(rules).is_none() => Err(Error::Interrupted),

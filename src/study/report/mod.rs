@@ -16,7 +16,10 @@ mod viewer;
 use std::fmt::Write;
 
 use super::{
-    folder::Folder, own_errors::JUDGED_FROM, plan::Rule, reference_check::Verdict, results::Report,
+    folder::Folder,
+    plan::{JUDGED_FROM, Rule},
+    reference_check::Verdict,
+    results::Report,
     runs::StudiedScene,
 };
 use crate::{error::Result, files::write_text};

@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::{
     metrics::{Errors, parts::PartErrors},
-    own_errors::is_judged,
     plan::{Plan, Rule},
+    reference::is_judged,
     runs::{Measurement, Run, StudiedScene},
     statistics::{Interval, geometric_interval, mean_interval, slope},
     surfaces::Parts,

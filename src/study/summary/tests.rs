@@ -4,8 +4,8 @@
 use super::*;
 use crate::session::Figures;
 use crate::study::{
-    own_errors::{OwnErrors, OwnParts},
     plan::{Description, Options},
+    reference::{OwnErrors, OwnParts},
     runs::Conditions,
 };
 

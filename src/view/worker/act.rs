@@ -147,7 +147,7 @@ impl Worker {
             return Ok(());
         }
         let Some(at) = self.clicked.take() else { return Ok(()) };
-        let film = self.parts.left.session.renderer.film_size();
+        let film = self.parts.left.session.renderer.film_size;
         let pixel = self.parts.panel.borrow().projector.pixel_under(at, film);
         let Some([x, y]) = pixel else { return Ok(()) };
         let points = self.parts.left.points()?;
@@ -211,7 +211,7 @@ impl Worker {
         let title = format!("{} | preparing {}", self.parts.scene.name, sampler.name());
         (self.parts.announce)(self.status(title));
         let settings = Settings { sampler, ..self.parts.settings.clone() };
-        let buffers = Some(self.parts.left.session.renderer.scene_buffers());
+        let buffers = Some(self.parts.left.session.renderer.runner.scene.clone());
         let guide = self.guide.as_deref();
         let mut side = Side::new(&self.parts.device, &self.parts.scene, buffers, &settings, guide)?;
         side.session.renderer.set_watch(self.watch());
@@ -236,7 +236,7 @@ impl Worker {
 
     /// Draws what the pixel under the pointer has learned, into the inset.
     pub(super) fn draw_inset(&mut self) -> Result<()> {
-        let film = self.parts.left.session.renderer.film_size();
+        let film = self.parts.left.session.renderer.film_size;
         let panel = self.parts.panel.borrow();
         let pixel = panel.pointer.and_then(|at| panel.projector.pixel_under(at, film));
         drop(panel);
