@@ -1,7 +1,7 @@
 //! Visibility records on the host: their cubes and bins, and counts → expected visibility. Places and
 //! directions find their record by `glsl/control_variates/records.glsl`.
 
-use super::parameters::ControlVariatesParameters;
+use super::ControlVariatesParameters;
 use crate::{
     sampler::regions::cell_edges,
     scene::Scene,

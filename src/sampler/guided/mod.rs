@@ -25,7 +25,6 @@ mod counts;
 mod entries;
 mod epoch;
 mod estimate;
-mod explained;
 mod guide;
 mod key;
 mod packing;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{
-    steps::cache_places,
+    cache_places,
     tree::{Tree, first_of_level, node_centre},
 };
 use crate::{

@@ -6,22 +6,41 @@
 //! `--set haar-cache=on` nodes near blocked directions lose weight, as lobes do under `visibility`.
 
 mod buffers;
-mod parameters;
-mod steps;
 pub mod tree;
 
 use std::{collections::BTreeMap, time::Instant};
 
 pub use buffers::NodeSize;
-pub use parameters::HaarParameters;
-pub use steps::HaarSteps;
 use tree::Tree;
 
-use super::{Context, Parameters, Room, knob::Knobs, rays::Unlearned};
+use super::{
+    Context, Parameters, Room,
+    knob::{Knobs, ON_OR_OFF, parameters},
+    rays::Unlearned,
+};
 use crate::{
     error::Result,
-    pass::{PathDemand, Technique},
+    pass::{Domain, Kernel, PathDemand, SHADOW_RAYS_PER_GROUP, Steps, Surfaces, Technique},
+    shader::{
+        rooms::haar::{CONSTANT_HAAR_DEPTH, CONSTANT_HAAR_LEVEL},
+        rooms::product::{CONSTANT_BRDF_SHARE, CONSTANT_ENVIRONMENT_SHARE},
+        rooms::visibility::{
+            CONSTANT_CACHE_CAPACITY, CONSTANT_THRESHOLD_SCALE, CONSTANT_VISIBILITY_EXPONENT,
+        },
+        structs::Wave,
+    },
 };
+
+parameters! {
+    /// Parameters of `haar` beside shares and visibility weights, which are those of `product` and
+    /// `visibility`.
+    pub struct HaarParameters {
+        /// `haar-level`: base-2 logarithm of the product's nodes along each side of the square.
+        "haar-level" level: u32 = 3, 3..=5;
+        /// `haar-cache`: on if nodes near blocked directions lose weight at the same hit.
+        "haar-cache" has_cache: bool = false, ON_OR_OFF;
+    }
+}
 
 pub(super) struct HaarRoom;
 
@@ -56,5 +75,69 @@ impl Room for HaarRoom {
         let set = Some(size.set(&runner.device, &tree, runner.waves.capacity)?);
         let host_ms = [("environment tree".to_owned(), tree_ms)].into();
         Ok(Box::new(Unlearned { steps, set, host_ms }))
+    }
+}
+
+/// Steps of `haar`: `multiply_nodes` once per hit, `sample_nodes` per group of rays, and with a cache
+/// `lower_nodes` after each single ray.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HaarSteps {
+    parameters: Parameters,
+    depth: u32,
+    surfaces: Surfaces,
+    shadow_rays: u32,
+}
+
+impl HaarSteps {
+    /// Returns the steps at `shadow_rays` rays per hit, with the environment's texels at level `depth`.
+    pub fn new(parameters: &Parameters, depth: u32, surfaces: Surfaces, shadow_rays: u32) -> Self {
+        Self { parameters: *parameters, depth, surfaces, shadow_rays }
+    }
+
+    fn kernel(&self, shader: &'static str, constants: &[(u32, u32)]) -> Kernel {
+        let own = [
+            (CONSTANT_HAAR_LEVEL, self.parameters.haar.level),
+            (CONSTANT_HAAR_DEPTH, self.depth),
+            (CONSTANT_CACHE_CAPACITY, cache_places(&self.parameters, self.shadow_rays)),
+        ];
+        Kernel::new(shader, Domain::Paths, &[&own[..], constants].concat())
+    }
+}
+
+/// Directions that the cache of a hit has room for: those of all rays before the last; 0 without a cache.
+fn cache_places(parameters: &Parameters, shadow_rays: u32) -> u32 {
+    if parameters.haar.has_cache { shadow_rays.saturating_sub(1).max(1) } else { 0 }
+}
+
+impl Steps for HaarSteps {
+    /// One with a cache, since each shadow ray teaches the next.
+    fn rays_per_group(&self) -> u32 {
+        if self.parameters.haar.has_cache { 1 } else { SHADOW_RAYS_PER_GROUP }
+    }
+
+    fn prepare(&self, _wave: &Wave) -> Vec<Kernel> {
+        vec![self.kernel("multiply_nodes", &self.surfaces.constants())]
+    }
+
+    fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
+        let shares = self.parameters.product;
+        let own = [
+            (CONSTANT_BRDF_SHARE, shares.brdf_share.to_bits()),
+            (CONSTANT_ENVIRONMENT_SHARE, shares.environment_share.to_bits()),
+        ];
+        vec![self.kernel("sample_nodes", &[&own[..], &self.surfaces.constants()].concat())]
+    }
+
+    fn after_shadow_rays(&self, wave: &Wave) -> Vec<Kernel> {
+        let is_last = wave.first_shadow_ray + wave.shadow_ray_count >= wave.total_shadow_rays;
+        if !self.parameters.haar.has_cache || is_last {
+            return Vec::new();
+        }
+        let visibility = self.parameters.visibility;
+        let own = [
+            (CONSTANT_THRESHOLD_SCALE, visibility.threshold_scale.to_bits()),
+            (CONSTANT_VISIBILITY_EXPONENT, visibility.exponent.to_bits()),
+        ];
+        vec![self.kernel("lower_nodes", &own)]
     }
 }

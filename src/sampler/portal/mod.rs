@@ -4,15 +4,11 @@
 //! and a direction uniform in that solid angle \[Ureña, Fajardo & King 2013\]. BRDF and environment reach
 //! every direction outside the portals, so that the picture does not depend on where they are.
 
-mod parameters;
-
 use std::{collections::BTreeMap, sync::Arc};
-
-pub use parameters::PortalParameters;
 
 use super::{
     Context, Parameters, Room,
-    knob::Knobs,
+    knob::{Knobs, parameters},
     rays::{RaySteps, Unlearned},
 };
 use crate::{
@@ -25,6 +21,15 @@ use crate::{
         rooms::portal::{self, CONSTANT_PORTAL_SHARE, CONSTANT_PORTALS},
     },
 };
+
+parameters! {
+    /// Parameters of `portal`.
+    pub struct PortalParameters {
+        /// `portal-share`: share of the portals among directions that are not from the BRDF; the rest is the
+        /// environment's.
+        "portal-share" portal_share: f32 = 0.5, 0.0..=1.0;
+    }
+}
 
 pub(super) struct PortalRoom;
 

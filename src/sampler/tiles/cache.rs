@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::grid::SectorGrid;
+use super::SectorGrid;
 use crate::{
     sampler::regions::Partition,
     shader::rooms::tiles::{TILE_RESPONSE_UNITS, TILE_SCALE},

@@ -5,26 +5,39 @@
 //! thesis.
 
 mod parameters;
-mod readback;
-mod steps;
 
 use std::collections::BTreeMap;
 
+use glam::Vec3;
 pub use parameters::{CacheScope, Threshold, VisibilityParameters};
-pub use steps::VisibilitySteps;
 
 use super::{
     Context, Parameters, Room,
     knob::Knobs,
-    product::{self, Fits, LobeBuffers, LobeSize},
+    product::{self, FitSizes, Fits, LobeBuffers, LobeSize, ProductParameters, ProductSteps},
 };
 use crate::{
     error::{Error, Result},
     film::Aov,
     gpu::DescriptorSet,
-    pass::{Passes, PathDemand, PixelReadback, Progress, Report, Runner, Steps, Technique},
-    shader::rooms::product as bindings,
+    math::octahedron,
+    pass::{
+        BLOCK_PIXELS, Domain, Kernel, Passes, PathDemand, PixelReadback, Progress, Report, Runner,
+        Steps, Surfaces, Technique, geometry::Traversal,
+    },
+    shader::{
+        constants::AOV_CACHE_ENTRIES,
+        rooms::product as bindings,
+        rooms::visibility::{
+            CONSTANT_CACHE_CAPACITY, CONSTANT_CACHE_OF_PIXEL, CONSTANT_FIXED_THRESHOLD,
+            CONSTANT_THRESHOLD_SCALE, CONSTANT_VISIBILITY_EXPONENT,
+        },
+        structs::Wave,
+    },
 };
+
+/// Head bit of a cache that holds the last ray of its hit; twin of `cache.glsl`.
+const CACHE_GROWN: u32 = 1 << 31;
 
 pub(super) struct VisibilityRoom;
 
@@ -98,6 +111,41 @@ impl Visibility {
     fn keeps_caches(&self) -> bool {
         self.parameters.cache == CacheScope::Pixel
     }
+
+    /// V of the first path's lobes for its last ray, in a wave of one block; twin of
+    /// `weights.glsl`. Fails if the device does.
+    fn visibility_weights(&self, lobe_count: usize) -> Result<Vec<f64>> {
+        let places = self.cache_places as usize;
+        let cache: Vec<u32> =
+            self.lobes.set.buffer(bindings::VISIBILITY_CACHE).download(1 + places)?;
+        // Weights do not yet include what the last ray taught.
+        let recorded =
+            (cache[0] & !CACHE_GROWN) as usize - usize::from(cache[0] & CACHE_GROWN != 0);
+        let stride = BLOCK_PIXELS as usize;
+        let words_per_mask = self.kept_lobes.div_ceil(32) as usize;
+        let length = ((places + 1) * words_per_mask - 1) * stride + 1;
+        let masks: Vec<u32> = self.lobes.set.buffer(bindings::CLOSE_LOBES).download(length)?;
+        let weight = |lobe: usize| {
+            let is_close = |entry: &usize| {
+                let word = entry % (places + 1) * words_per_mask + lobe / 32;
+                masks[word * stride] >> (lobe % 32) & 1 != 0
+            };
+            let close = (recorded - recorded.min(places)..recorded).filter(is_close).count();
+            (1.0 + close as f64).powf(-f64::from(self.parameters.exponent))
+        };
+        Ok((0..lobe_count).map(weight).collect())
+    }
+
+    /// Reads the first path's cached directions in world space, oldest first. Fails if the device does.
+    fn cached_directions(&self) -> Result<Vec<Vec3>> {
+        let places = self.cache_places as usize;
+        let words: Vec<u32> =
+            self.lobes.set.buffer(bindings::VISIBILITY_CACHE).download(1 + places)?;
+        let recorded = (words[0] & !CACHE_GROWN) as usize;
+        let oldest = if recorded > places { recorded % places } else { 0 };
+        let in_order = (0..recorded.min(places)).map(|i| words[1 + (oldest + i) % places]);
+        Ok(in_order.map(octahedron::unpack).collect())
+    }
 }
 
 impl Passes for Visibility {
@@ -136,13 +184,77 @@ impl Technique for Visibility {
     }
 
     fn explain(&self, pixel: &mut PixelReadback) -> Result<()> {
-        let factors = self.visibility_weights(product::readback::lobe_count(&self.lobes)?)?;
-        product::readback::read_lobes(&self.lobes, &factors, &mut pixel.lobes)?;
+        let factors = self.visibility_weights(self.lobes.count()?)?;
+        self.lobes.read(&factors, &mut pixel.lobes)?;
         pixel.cached = Some(self.cached_directions()?);
         Ok(())
     }
 
     fn report(&self) -> Report {
         product::report(&self.lobes)
+    }
+}
+
+/// Steps of `visibility`: `sample_and_trace` draws, traces and records the rays of a hit in turn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VisibilitySteps {
+    product: ProductSteps,
+    scope: CacheScope,
+    traversal: Traversal,
+}
+
+impl VisibilitySteps {
+    /// Returns the steps at `shadow_rays` rays per hit.
+    pub fn new(
+        parameters: VisibilityParameters,
+        product: ProductParameters,
+        fits: FitSizes,
+        surfaces: Surfaces,
+        traversal: Traversal,
+        shadow_rays: u32,
+    ) -> Self {
+        let VisibilityParameters { exponent, threshold_scale, threshold, cache, .. } = parameters;
+        let constants = vec![
+            (CONSTANT_THRESHOLD_SCALE, threshold_scale.to_bits()),
+            (CONSTANT_FIXED_THRESHOLD, u32::from(threshold == Threshold::Fixed)),
+            (CONSTANT_CACHE_CAPACITY, parameters.cache_places(shadow_rays)),
+            (CONSTANT_CACHE_OF_PIXEL, u32::from(cache == CacheScope::Pixel)),
+            (CONSTANT_VISIBILITY_EXPONENT, exponent.to_bits()),
+        ];
+        let product =
+            ProductSteps { cache: constants, ..ProductSteps::new(product, fits, surfaces) };
+        Self { product, scope: cache, traversal }
+    }
+}
+
+impl Steps for VisibilitySteps {
+    fn counts(&self) -> u32 {
+        self.product.counts()
+    }
+
+    fn traces(&self) -> bool {
+        true
+    }
+
+    fn prepare(&self, wave: &Wave) -> Vec<Kernel> {
+        let mut kernels = self.product.prepare(wave);
+        if self.scope == CacheScope::Pixel {
+            kernels.push(self.product.kernel("reweight", &[]));
+        }
+        kernels
+    }
+
+    fn sample(&self, _wave: &Wave) -> Vec<Kernel> {
+        let surfaces = self.traversal.constants(self.product.surfaces);
+        let constants = [&self.product.mixture_constants()[..], &surfaces].concat();
+        vec![self.product.kernel("sample_and_trace", &constants)]
+    }
+
+    fn finish(&self, wave: &Wave) -> Vec<Kernel> {
+        if wave.aovs & AOV_CACHE_ENTRIES == 0 || wave.total_shadow_rays == 0 {
+            return Vec::new();
+        }
+        let kernel = self.product.kernel("count_entries", &[]);
+        vec![Kernel { domain: Domain::Pixels, ..kernel }]
     }
 }
