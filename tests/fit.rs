@@ -88,17 +88,17 @@ fn planted_mixtures_are_recovered() {
     for method in [Method::Em, Method::L2] {
         let fit = fit_map(&target, planted.len(), method);
         assert_eq!(fit.lobes.len(), planted.len());
-        assert!(fit.errors.relative_l2 < 0.03, "{method}: {:?}", fit.errors);
-        assert!(fit.errors.kullback_leibler.abs() < 2e-3, "{method}: {:?}", fit.errors);
-        assert!((fit.errors.energy_captured - 1.0).abs() < 5e-3, "{method}: {:?}", fit.errors);
+        assert!(fit.errors.relative_l2 < 0.03, "{method:?}: {:?}", fit.errors);
+        assert!(fit.errors.kullback_leibler.abs() < 2e-3, "{method:?}: {:?}", fit.errors);
+        assert!((fit.errors.energy_captured - 1.0).abs() < 5e-3, "{method:?}: {:?}", fit.errors);
         for (lobe, colour) in planted.iter().zip(&colours) {
             let near = |a: &&fenestra::fit::EnvironmentLobe| Vec3::from(a.axis).distance(lobe.axis);
             let found = fit.lobes.iter().min_by(|a, b| near(a).total_cmp(&near(b))).unwrap();
-            assert!(near(&found) < 0.01, "{method}: {lobe:?} {found:?}");
+            assert!(near(&found) < 0.01, "{method:?}: {lobe:?} {found:?}");
             assert!((found.bandwidth / lobe.bandwidth - 1.0).abs() < 0.05, "{lobe:?} {found:?}");
             let expected = lobe.amplitude * *colour;
             let error = (Vec3::from(found.colour) - expected).abs().max_element();
-            assert!(error < 0.05 * expected.max_element(), "{method}: {expected} {found:?}");
+            assert!(error < 0.05 * expected.max_element(), "{method:?}: {expected} {found:?}");
         }
     }
 }

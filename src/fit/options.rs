@@ -15,15 +15,6 @@ pub enum Method {
     L2,
 }
 
-impl std::fmt::Display for Method {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        formatter.write_str(match self {
-            Self::Em => "em",
-            Self::L2 => "l2",
-        })
-    }
-}
-
 /// Checks that a number, such as that of lobes, is from 1 to `most`.
 pub(crate) fn check_count(count: usize, what: &str, most: usize) -> Result<()> {
     if (1..=most).contains(&count) {

@@ -37,8 +37,8 @@ pub fn describe(path: &Path) -> Result<Description> {
 
 fn method(method: Method) -> &'static str {
     match method {
-        Method::Em => "Kullback-Leibler divergence, expectation maximization",
-        Method::L2 => "squared error, L-BFGS",
+        Method::Em => "em (Kullback-Leibler divergence, expectation maximization)",
+        Method::L2 => "l2 (squared error, L-BFGS)",
     }
 }
 
@@ -64,7 +64,7 @@ pub(crate) fn describe_environment(fit: &EnvironmentFit) -> Description {
     let (low, high) = bandwidths(fit.lobes.iter().map(|lobe| (lobe.bandwidth, lobe.amplitude)));
     let mut lines = vec![
         format!("environment fit of {}", fit.source),
-        format!("method           {} ({})", fit.method, method(fit.method)),
+        format!("method           {}", method(fit.method)),
         format!("lobes            {} of {} asked for", fit.lobes.len(), fit.requested_lobes),
         format!("bandwidths       {low:.3} to {high:.1}"),
     ];
@@ -90,7 +90,7 @@ pub(crate) fn describe_brdf(fit: &BrdfFit) -> Description {
     let summary = &fit.summary;
     let mut lines = vec![
         format!("BRDF fit of {}", fit.source),
-        format!("method           {} ({})", fit.method, method(fit.method)),
+        format!("method           {}", method(fit.method)),
         format!("views            {}", fit.views.len()),
         format!("lobes per view   {count} of {} asked for", fit.requested_lobes),
         format!("bandwidths       {low:.3} to {high:.1}"),
