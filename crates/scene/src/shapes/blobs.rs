@@ -51,18 +51,22 @@ enum Part {
 }
 
 impl Part {
-    /// Distance of a point, with what its gradient is made of.
-    fn distance(self, point: DVec3) -> (f64, Slope) {
+    /// Distance of a point and its gradient, which costs nothing where it is not used.
+    #[inline(always)]
+    fn distance(self, point: DVec3) -> (f64, DVec3) {
         match self {
             Self::Ellipsoid { center, radii } => {
                 let scaled = (point - center) / radii;
                 let twice_scaled = scaled / radii;
                 let (length, steep) = (scaled.length(), twice_scaled.length());
-                let distance = match steep {
-                    0.0 => -radii.min_element(),
-                    _ => length * (length - 1.0) / steep,
-                };
-                (distance, Slope::Ellipsoid { twice_scaled, length, steep, radii })
+                if steep == 0.0 {
+                    return (-radii.min_element(), DVec3::ZERO);
+                }
+                let distance = length * (length - 1.0) / steep;
+                let length_gradient = twice_scaled / length;
+                let steep_gradient = twice_scaled / (radii * radii * steep);
+                let gradient = (2.0 * length - 1.0) * length_gradient - distance * steep_gradient;
+                (distance, gradient / steep)
             }
             Self::Cone { from, to, from_radius, to_radius } => {
                 let axis = to - from;
@@ -73,7 +77,7 @@ impl Part {
                 let radius = from_radius + along.clamp(0.0, 1.0) * widening;
                 let is_between = (0.0..=1.0).contains(&along) && squared > 0.0;
                 let widening = if is_between { axis * (widening / squared) } else { DVec3::ZERO };
-                (offset.length() - radius, Slope::Cone { offset, widening })
+                (offset.length() - radius, offset.normalize_or_zero() - widening)
             }
         }
     }
@@ -85,27 +89,6 @@ impl Part {
             Self::Cone { from, to, from_radius, to_radius } => {
                 [(from - from_radius).min(to - to_radius), (from + from_radius).max(to + to_radius)]
             }
-        }
-    }
-}
-
-/// Quantities of a [`Part::distance`] that its gradient shares.
-#[derive(Clone, Copy, Debug)]
-enum Slope {
-    Ellipsoid { twice_scaled: DVec3, length: f64, steep: f64, radii: DVec3 },
-    Cone { offset: DVec3, widening: DVec3 },
-}
-
-impl Slope {
-    fn gradient(self, distance: f64) -> DVec3 {
-        match self {
-            Self::Ellipsoid { steep: 0.0, .. } => DVec3::ZERO,
-            Self::Ellipsoid { twice_scaled, length, steep, radii } => {
-                let length_gradient = twice_scaled / length;
-                let steep_gradient = twice_scaled / (radii * radii * steep);
-                ((2.0 * length - 1.0) * length_gradient - distance * steep_gradient) / steep
-            }
-            Self::Cone { offset, widening } => offset.normalize_or_zero() - widening,
         }
     }
 }
@@ -159,9 +142,7 @@ impl Field {
 
     fn distance_and_gradient(&self, point: DVec3) -> (f64, DVec3) {
         let join = |parts: &[Part]| {
-            let slopes = parts.iter().map(|part| part.distance(point));
-            let parts: Vec<_> =
-                slopes.map(|(distance, slope)| (distance, slope.gradient(distance))).collect();
+            let parts: Vec<_> = parts.iter().map(|part| part.distance(point)).collect();
             soft_minimum_and_gradient(&parts, self.blend)
         };
         let (added, added_gradient) = join(&self.added);
