@@ -3,7 +3,6 @@
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
 mod beside;
-mod camera;
 pub mod coat;
 pub mod environment;
 pub mod error;
@@ -12,7 +11,6 @@ pub mod features;
 mod file;
 pub mod files;
 pub mod geometry;
-mod gloss;
 mod hash;
 mod import;
 pub mod instance;
@@ -28,7 +26,6 @@ pub mod mesh;
 mod mitsuba;
 mod pbrt;
 pub mod picture;
-mod portal;
 mod quadrics;
 mod shapes;
 mod spectrum;
@@ -40,9 +37,9 @@ mod triangulate;
 
 use std::path::PathBuf;
 
+use glam::Vec3;
 use serde::Deserialize;
 
-pub use camera::Camera;
 pub use environment::EnvironmentMap;
 pub use error::{Error, Result};
 pub use geometry::Geometry;
@@ -50,7 +47,6 @@ pub use hash::{environment_hash, geometry_hash, still_hash};
 pub use instance::Instance;
 pub use lamp::Lamp;
 pub use material::Material;
-pub use portal::Portal;
 
 /// Largest width and height of the film, pixels.
 pub const MAX_FILM_SIDE: u32 = 16_384;
@@ -134,4 +130,38 @@ pub struct Scene {
     /// SHA-256 of everything that changes the picture: camera, film, environment texels, materials
     /// with their tables, geometry. Lower-case hexadecimal.
     pub hash: String,
+}
+
+/// Right-handed perspective camera that looks from `position` to `look_at`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Centre of projection, metres.
+    pub position: Vec3,
+    /// Point at the centre of the image, metres.
+    pub look_at: Vec3,
+    /// Direction that points up in the image; need not be orthogonal to the view.
+    pub up: Vec3,
+    /// Angle between the bottom and top edges of the image, degrees.
+    pub vertical_fov_deg: f32,
+    /// Radius of the thin lens, metres; 0 for a pinhole.
+    pub aperture_radius: f32,
+    /// Distance along the view axis from the lens to the plane of focus, metres.
+    pub focus_distance: f32,
+}
+
+/// Most portals of a scene: every shadow ray goes through all of them.
+pub(crate) const MAX_PORTALS: usize = 256;
+
+/// Rectangle that light of the environment comes through. It serves sampling alone: neither the picture
+/// nor what rays meet depends on it. Both sides count.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Portal {
+    /// Name in the file; may be empty.
+    pub name: String,
+    /// One corner, metres.
+    pub corner: Vec3,
+    /// Unit vectors along the edges from there, perpendicular to each other.
+    pub axes: [Vec3; 2],
+    /// Lengths of these edges, metres.
+    pub size: [f32; 2],
 }

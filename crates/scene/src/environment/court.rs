@@ -3,10 +3,7 @@
 use glam::Vec3;
 use serde::Deserialize;
 
-use super::{
-    EnvironmentMap,
-    procedural::{check_radiance, check_range, check_width, render},
-};
+use super::{EnvironmentMap, check_radiance, check_range, check_width, render};
 use crate::math::random::random_independent_1d;
 
 /// Narrow courtyard under a bright strip of sky: plastered facades with rows of windows, some of

@@ -4,10 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use super::{
-    EnvironmentMap,
-    procedural::{check_radiance, check_range, check_width, render, texel_direction},
-};
+use super::{EnvironmentMap, check_radiance, check_range, check_width, render, texel_direction};
 use crate::math::frame::{lat_long_from_direction, sin_cos_pi};
 
 /// Clear sky with a sun disc above a uniform ground.

@@ -26,7 +26,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::EnvironmentMap;
-use crate::math::{colour::luminance, cumulative::write_cumulative};
+use crate::math::{colour::luminance, write_cumulative};
 
 /// Luminance C that compensated tables subtract, in means of the map over the sphere: at least half of
 /// the energy is left, and without contrast the density stays as it is. Chosen by measurement

@@ -11,7 +11,10 @@ use glam::{Vec2, Vec3};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use rayon::prelude::*;
 
-use super::{folder::safe_stem, number_of, ply::SAME_UV};
+use super::{
+    folder::{SAME_UV, safe_stem},
+    number_of,
+};
 use crate::{
     coat::base_below_coat,
     error::Result,

@@ -10,7 +10,6 @@ mod images;
 pub mod mitsuba;
 mod parts;
 pub mod pbrt;
-mod ply;
 mod subject;
 
 use glam::Vec3;

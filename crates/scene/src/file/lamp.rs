@@ -1,4 +1,4 @@
-//! `[[lamp]]`.
+//! `[[lamp]]` and `[[portal]]`.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -68,4 +68,17 @@ pub(crate) struct DirectionalEntry {
     pub direction: [f32; 3],
     /// Irradiance on a surface that faces the light.
     pub irradiance: [f32; 3],
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PortalKeys {
+    /// Name, for messages.
+    pub name: Option<String>,
+    /// One corner of the rectangle, metres.
+    pub corner: [f32; 3],
+    /// Edge from that corner, metres.
+    pub first_edge: [f32; 3],
+    /// Other edge from that corner, metres, perpendicular to the first.
+    pub second_edge: [f32; 3],
 }

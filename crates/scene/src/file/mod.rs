@@ -4,7 +4,6 @@
 
 mod lamp;
 mod material;
-mod portal;
 mod read;
 mod value;
 
@@ -16,9 +15,8 @@ use std::{
 use serde::Deserialize;
 use toml::Spanned;
 
-pub(crate) use lamp::{LampEntry, LampKeys, LampKindEntry};
+pub(crate) use lamp::{LampEntry, LampKeys, LampKindEntry, PortalKeys};
 pub(crate) use material::{MaterialEntry, MaterialKeys, MaterialKindEntry};
-pub(crate) use portal::PortalKeys;
 pub(crate) use value::{NumberOrVector, TextureEntry, Textured};
 
 use super::{

@@ -8,14 +8,13 @@ use glam::Vec3;
 use super::Value;
 use crate::{
     MIN_ALPHA,
-    coat::normal_reflectance,
+    coat::{DIELECTRIC, metallic_roughness, normal_reflectance},
     features::Feature,
-    gloss::{DIELECTRIC, metallic_roughness},
     material::{Material, MaterialKind, Principled, Surface},
     math::colour::luminance,
     texture::{
         Channels, TextureUse,
-        texelwise::{Texelwise, lie_alike},
+        linear::{Texelwise, lie_alike},
     },
 };
 

@@ -1,8 +1,7 @@
 //! Shared by the readers of other formats: the scene that they return, media and illuminants by name,
-//! mixtures of materials, bump maps, equal-area maps, and the gamut of reflectances.
+//! mixtures of materials, bump maps, and the gamut of reflectances.
 
 pub(crate) mod blend;
-pub(crate) mod equal_area;
 pub(crate) mod media;
 pub(crate) mod relief;
 
@@ -17,7 +16,7 @@ use crate::{
     material::{Material, MaterialKind},
     texture::{
         TextureUse,
-        texelwise::{Texelwise, lie_alike},
+        linear::{Texelwise, lie_alike},
     },
 };
 

@@ -3,14 +3,12 @@
 //! Messages name the object or material and the line of its entry.
 
 pub mod arrays;
-mod import;
 mod include;
 mod inside;
 mod keyframes;
 mod light;
 mod materials;
 mod objects;
-mod portals;
 mod whole;
 
 use std::path::{Path, PathBuf};

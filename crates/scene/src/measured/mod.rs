@@ -3,7 +3,6 @@
 //! Directions are unit vectors in the shading frame (z is the normal) and point away from the surface.
 //! Values are per steradian without the cosine.
 
-mod bilinear;
 pub mod cornell;
 pub mod layout;
 pub mod lookup;

@@ -7,7 +7,7 @@ use glam::{Vec3, vec3};
 use rayon::prelude::*;
 
 use crate::{
-    math::{colour::luminance, cumulative::write_cumulative},
+    math::{colour::luminance, write_cumulative},
     measured::{layout::*, lookup},
 };
 

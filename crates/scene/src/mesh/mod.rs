@@ -5,7 +5,6 @@
 
 mod coincident;
 mod gltf;
-pub(crate) mod images;
 mod mtl;
 mod obj;
 pub(crate) mod ply;

@@ -5,10 +5,9 @@ use glam::Vec3;
 use super::{
     Reader,
     document::Node,
-    parameters::Parameters,
+    parameters::{Parameters, float, value},
     spectra::{self, Role},
     textures::{MAX_SCALES, Value},
-    values,
 };
 use crate::{
     MIN_ALPHA,
@@ -276,9 +275,9 @@ impl Reader {
                 return Ok(media::dielectric(default).unwrap_or(1.0));
             };
             if node.tag() != "string" {
-                return values::float(node);
+                return float(node);
             }
-            let medium = values::value(node)?;
+            let medium = value(node)?;
             media::dielectric(medium).ok_or_else(|| {
                 let names = media::DIELECTRICS.map(|(name, _)| name).join(", ");
                 node.error(format!("{name}: expected a number or one of {names}, found `{medium}`"))
@@ -338,8 +337,8 @@ impl Reader {
         let of_old = (is_copper && eta.is_none() && k.is_none()).then_some("Cu");
         let material = parameters.string("material")?.or(of_old);
         let outside = match parameters.any("ext_eta")? {
-            Some(node) if node.tag() != "string" => values::float(node)?,
-            Some(node) => media::dielectric(values::value(node)?).unwrap_or(1.0),
+            Some(node) if node.tag() != "string" => float(node)?,
+            Some(node) => media::dielectric(value(node)?).unwrap_or(1.0),
             None => 1.0,
         };
         let metal = match (material, eta, k) {

@@ -3,15 +3,18 @@
 use glam::Vec3;
 
 use super::{
-    Reader, bsdfs::colored, document::Node, parameters::Parameters, spectra::Role, textures::Value,
-    values,
+    Reader,
+    bsdfs::colored,
+    document::Node,
+    parameters::{Parameters, numbers},
+    spectra::Role,
+    textures::Value,
 };
 use crate::{
     MIN_ALPHA,
-    coat::COAT_IOR,
+    coat::{COAT_IOR, DIELECTRIC},
     error::Result,
     features,
-    gloss::DIELECTRIC,
     import::{self, Width, blend::mixed},
     material::{Material, MaterialKind, Principled},
     math::colour::luminance,
@@ -67,7 +70,7 @@ impl Reader {
     /// Mixture of models by weights, of version 0.6.
     pub(super) fn mixture(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let node = parameters.node;
-        let weights = values::numbers(node, parameters.string("weights")?.unwrap_or_default())?;
+        let weights = numbers(node, parameters.string("weights")?.unwrap_or_default())?;
         let models = parameters.objects("bsdf")?;
         if models.is_empty() || weights.len() != models.len() {
             return Err(node.error("mixturebsdf: expected as many `weights` as bsdfs in it"));

@@ -6,11 +6,8 @@
 //! of the element at fault.
 
 mod bsdfs;
-mod daylight;
 mod document;
 mod emitters;
-mod environment;
-mod medium;
 mod mixtures;
 mod parameters;
 mod principled;
@@ -19,10 +16,7 @@ mod serialized;
 mod shapes;
 mod spectra;
 mod strands;
-mod text;
 mod textures;
-mod transforms;
-mod values;
 
 use std::{
     collections::{HashMap, HashSet},

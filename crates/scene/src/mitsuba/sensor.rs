@@ -5,8 +5,7 @@ use glam::DVec3;
 use super::{
     Reader,
     document::Node,
-    parameters::Parameters,
-    transforms::{NO_INVERSE, turned},
+    parameters::{NO_INVERSE, Parameters, turned},
 };
 use crate::{
     Asked, FilmSettings, Filter, MAX_FILM_SIDE, error::Result, features, file::CameraEntry,

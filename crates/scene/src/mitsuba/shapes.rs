@@ -8,9 +8,8 @@ use super::{
     Reader,
     bsdfs::{default_of_shapes, diffuse},
     document::Node,
-    parameters::Parameters,
+    parameters::{NO_INVERSE, Parameters},
     serialized,
-    transforms::NO_INVERSE,
 };
 use crate::{
     error::Result,

@@ -6,8 +6,7 @@ use glam::Vec3;
 
 use super::{
     document::Node,
-    parameters::Parameters,
-    values::{float, number, numbers, value},
+    parameters::{Parameters, float, number, numbers, value},
 };
 use crate::{
     error::Result,

@@ -4,8 +4,7 @@ use glam::{DMat4, DVec3};
 
 use super::{
     directives::Description,
-    log::Log,
-    parameters::{Entity, Kind},
+    parameters::{Entity, Kind, Log},
 };
 use crate::{FilmSettings, Filter, error::Result, features, file::CameraEntry};
 

@@ -5,11 +5,9 @@ use std::{collections::HashMap, path::Path, rc::Rc};
 use glam::{DMat4, DVec3};
 
 use super::{
-    log::Log,
-    parameters::{Entity, Parameter, read_parameters},
-    source::{Part, Source},
+    parameters::{Entity, Log, Parameter, read_parameters},
     state::{MaterialChoice, Saved, State, States, look_at},
-    tokens::{Place, Token},
+    tokens::{Part, Place, Source, Token},
 };
 use crate::{
     beside::Folder,

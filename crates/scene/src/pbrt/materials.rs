@@ -1,4 +1,4 @@
-//! Materials of a scene description → the nearest [`Material`]s.
+//! Materials of a scene description → the nearest [`Material`]s; media inside shapes → absorption.
 
 use glam::Vec3;
 
@@ -8,6 +8,7 @@ use super::{
     spectra,
     state::MaterialChoice,
     textures::{Textures, map_numbers},
+    tokens::Place,
 };
 use crate::{
     coat::{COAT_IOR, albedo_below_coat},
@@ -379,5 +380,44 @@ fn color(value: Value, surface: &mut Surface) -> Vec3 {
             surface.color = Some(image);
             Vec3::ONE
         }
+    }
+}
+
+impl Materials<'_> {
+    /// Lets a dielectric absorb as the medium inside it does; names a medium that does more, or that
+    /// another surface bounds.
+    pub(super) fn fill(
+        &mut self,
+        kind: Option<&mut MaterialKind>,
+        medium: &str,
+        place: &Place,
+    ) -> Result<()> {
+        let Some(entity) = self.description.media.get(medium) else {
+            let message = format!("MediumInterface \"{medium}\": there is no such medium");
+            return Err(place.error(message));
+        };
+        match (kind, self.absorption(entity)?) {
+            (Some(MaterialKind::Dielectric { absorption, .. }), Some(found)) => {
+                *absorption = found;
+                self.textures.log.unused(entity);
+            }
+            _ => self.textures.log.ignore(features::PBRT_MEDIUM, &entity.place),
+        }
+        Ok(())
+    }
+
+    /// Absorption coefficient, per metre, of a medium that neither scatters nor emits light.
+    fn absorption(&self, medium: &Entity) -> Result<Option<Vec3>> {
+        let color = |name: &str| match medium.find_of(name, &spectra::KINDS)? {
+            Some(parameter) => spectra::index(parameter, self.textures.folder),
+            None => Ok(Vec3::ONE),
+        };
+        let is_clear = medium.string("type")? == Some("homogeneous")
+            && color("sigma_s")? == Vec3::ZERO
+            && ["preset", "Le"].iter().all(|name| medium.find(name).is_none());
+        let scale = medium.number("scale", 1.0)? as f32;
+        let absorption = (scale * color("sigma_a")?).clamp(Vec3::ZERO, Vec3::splat(1e6));
+        medium.find("g");
+        Ok(is_clear.then_some(absorption))
     }
 }

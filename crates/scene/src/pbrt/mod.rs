@@ -15,12 +15,9 @@
 mod camera;
 mod directives;
 mod lights;
-mod log;
 mod materials;
-mod medium;
 mod parameters;
 mod shapes;
-mod source;
 mod spectra;
 mod state;
 mod subdivision;
@@ -29,7 +26,14 @@ mod tokens;
 
 use std::{collections::HashMap, path::Path, rc::Rc};
 
+use camera::View;
+use directives::{Description, Reader, Shape};
 use glam::{DMat4, Vec3};
+use lights::Lights;
+use materials::{Materials, set_opacity};
+use parameters::{Entity, Log};
+use state::MaterialChoice;
+use textures::Textures;
 
 use super::{
     Asked, Geometry, MIN_ALPHA, features,
@@ -46,14 +50,6 @@ use crate::{
     material::{Emission, Material, MaterialKind},
     strands::Detail,
 };
-use camera::View;
-use directives::{Description, Reader, Shape};
-use lights::Lights;
-use log::Log;
-use materials::{Materials, set_opacity};
-use parameters::Entity;
-use state::MaterialChoice;
-use textures::Textures;
 
 /// Most vertices, and most triangles, of a scene with all its instances.
 const MAX_COUNT: usize = 1 << 27;

@@ -4,8 +4,7 @@
 use glam::{DVec3, DVec4, Vec3};
 
 use super::{
-    log::Log,
-    parameters::{Entity, Kind},
+    parameters::{Entity, Kind, Log},
     subdivision::{MAX_TRIANGLES, subdivide},
 };
 use crate::{

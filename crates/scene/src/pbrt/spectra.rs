@@ -6,10 +6,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{
-    log::Log,
-    parameters::{Kind, Parameter, Values},
-};
+use super::parameters::{Kind, Log, Parameter, Values};
 use crate::{
     beside::Folder,
     error::Result,

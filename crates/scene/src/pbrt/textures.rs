@@ -8,8 +8,7 @@ use half::f16;
 
 use super::{
     directives::Description,
-    log::Log,
-    parameters::{Entity, Kind, Parameter},
+    parameters::{Entity, Kind, Log, Parameter},
     spectra,
 };
 use crate::{
@@ -17,8 +16,9 @@ use crate::{
     error::Result,
     features,
     import::Value,
-    mesh::images::has_alpha,
-    texture::{Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
+    texture::{
+        Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap, linear::has_alpha,
+    },
 };
 
 /// Most textures that may refer to one another.

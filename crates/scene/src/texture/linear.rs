@@ -1,8 +1,9 @@
-//! Texels as linear numbers, and textures made of others.
+//! Texels as linear numbers, what they tell of an image, and images made of others, texel by texel where
+//! these lie on a surface in the same way.
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3, Vec4};
 use half::f16;
 use rayon::prelude::*;
 
@@ -90,4 +91,112 @@ impl TextureUse {
         });
         sum.map(|total| (total / values.len().max(1) as f64) as f32)
     }
+}
+
+/// Images of a metallic-roughness material.
+pub(crate) struct Converted {
+    pub base_color: TextureUse,
+    pub roughness: TextureUse,
+    pub metallic: TextureUse,
+}
+
+/// Grid of the largest of some images.
+pub(crate) struct Texelwise {
+    width: u32,
+    height: u32,
+    /// The first of them, on whose coordinates all lie.
+    first: Option<TextureUse>,
+}
+
+/// Tests whether two textures lie on a surface in the same way.
+pub(crate) fn lie_alike(one: &TextureUse, other: &TextureUse) -> bool {
+    (one.uv_set, one.image_from_uv, one.wrap) == (other.uv_set, other.image_from_uv, other.wrap)
+}
+
+impl Texelwise {
+    /// Grid for images that lie alike.
+    pub(crate) fn of(uses: &[Option<&TextureUse>]) -> Self {
+        let sizes = uses.iter().flatten().map(|used| (used.texture.width, used.texture.height));
+        let larger = |a: (u32, u32), b: (u32, u32)| (a.0.max(b.0), a.1.max(b.1));
+        let (width, height) = sizes.reduce(larger).unwrap_or((1, 1));
+        Self { width, height, first: uses.iter().flatten().next().copied().cloned() }
+    }
+
+    /// Value of an image at a texel of the grid, and its opacity.
+    pub(crate) fn texel(&self, used: &TextureUse, index: usize) -> Vec4 {
+        if (used.texture.width, used.texture.height) == (self.width, self.height) {
+            return used.read(used.texture.linear_texel(used.encoding, index)).into();
+        }
+        let size = Vec2::new(self.width as f32, self.height as f32);
+        let (x, y) = (index % self.width as usize, index / self.width as usize);
+        used.value((Vec2::new(x as f32, y as f32) + 0.5) / size)
+    }
+
+    fn indices(&self) -> impl IndexedParallelIterator<Item = usize> {
+        (0..self.width as usize * self.height as usize).into_par_iter()
+    }
+
+    fn image(&self, what: &str, texels: Texels) -> TextureUse {
+        let (width, height) = (self.width, self.height);
+        let name = self.first.as_ref().map_or("", |first| &first.texture.name);
+        let name = format!("{name}, {what}");
+        let texture = Arc::new(Texture { name, width, height, texels });
+        let place = self.first.clone().unwrap_or_else(|| TextureUse::new(Arc::clone(&texture)));
+        place.showing(texture)
+    }
+
+    /// Image of the colours that `of` gives for texels.
+    pub(crate) fn color(&self, of: impl Fn(usize) -> Vec3 + Sync) -> TextureUse {
+        let texel = |index| of(index).extend(1.0).to_array().map(f16::from_f32);
+        self.image("with others", Texels::Halves(self.indices().map(texel).collect()))
+    }
+
+    /// Images of the base colour with its opacity, the roughness and the share of metal that `of` gives for
+    /// texels.
+    pub(crate) fn material(&self, of: impl Fn(usize) -> (Vec4, f32, f32) + Sync) -> Converted {
+        let byte = |share: f32| (255.0 * share).round() as u8;
+        let texel = |index: usize| {
+            let (base, roughness, metallic) = of(index);
+            let base = base.to_array().map(f16::from_f32);
+            (base, [0, byte(roughness), byte(metallic), u8::MAX])
+        };
+        let (base, packed) = self.indices().map(texel).unzip();
+        let packed = self.image("as metallic-roughness", Texels::Bytes(packed));
+        Converted {
+            base_color: self.image("as metallic-roughness", Texels::Halves(base)),
+            roughness: TextureUse { channels: Channels::Green, ..packed.clone() },
+            metallic: TextureUse { channels: Channels::Blue, ..packed },
+        }
+    }
+}
+
+/// Texels that tell of an image whether it holds normals.
+const TEXELS_LOOKED_AT: usize = 4096;
+
+/// Tests whether any texel lets light through.
+pub(crate) fn has_alpha(texture: &Texture) -> bool {
+    match &texture.texels {
+        Texels::Bytes(texels) => texels.iter().any(|texel| texel[3] < u8::MAX),
+        Texels::Shorts(texels) => texels.iter().any(|texel| texel[3] < u16::MAX),
+        Texels::Halves(texels) => texels.iter().any(|texel| texel[3].to_f32() < 1.0),
+    }
+}
+
+/// Opacity of a colour image, if any texel lets light through.
+pub(crate) fn opacity_of(color: &TextureUse) -> Option<TextureUse> {
+    let (channels, encoding) = (Channels::Alpha, Encoding::Linear);
+    has_alpha(&color.texture).then(|| TextureUse { channels, encoding, ..color.clone() })
+}
+
+/// Tests for texels that are vectors of about unit length, along +z on the mean, as those of normal maps.
+pub(crate) fn holds_normals(texture: &Texture) -> bool {
+    let count = texture.width as usize * texture.height as usize;
+    let step = count.div_ceil(TEXELS_LOOKED_AT);
+    let normals = (0..count).step_by(step).map(|texel| {
+        let texel = Vec4::from(texture.linear_texel(Encoding::Linear, texel)).truncate();
+        let normal = 2.0 * texel - 1.0;
+        normal.extend((normal.length() - 1.0).abs())
+    });
+    let mean = normals.sum::<Vec4>() / count.div_ceil(step) as f32;
+    mean.x.abs().max(mean.y.abs()) < 0.25 && mean.z > 0.5 && mean.w < 0.2
 }

@@ -1,20 +1,18 @@
 //! Images on surfaces: texels, and how a material reads them.
 
 mod cache;
-mod check;
 mod decode;
 pub(crate) mod exr;
 pub(crate) mod floats;
-mod linear;
+pub(crate) mod linear;
 pub mod lookup;
-pub(crate) mod texelwise;
 
 use std::sync::Arc;
 
 use serde::Deserialize;
 
 pub use cache::TextureCache;
-pub use check::MAX_TEXTURE_SIDE;
+pub use decode::MAX_TEXTURE_SIDE;
 
 /// Image whose texels vary a property of a material over a surface.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,13 +3,10 @@
 use glam::Vec3;
 use serde_json::{Value, json};
 
-use super::{
-    document::Textures,
-    images::{Layout, Sheet, peak},
-};
+use super::document::{Layout, Sheet, Textures, peak};
 use crate::{
+    coat::DEFAULT_IOR,
     export::subject::Subject,
-    gloss::DEFAULT_IOR,
     material::{ConductorFresnel, Emission, MaterialKind, Principled},
     texture::TextureUse,
 };

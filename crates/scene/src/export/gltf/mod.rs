@@ -9,12 +9,11 @@
 //! irradiance and radiance, without the factor 683 lm/W.
 
 mod document;
-mod images;
 mod materials;
-mod nodes;
 
-use std::{io::Write, path::Path};
+use std::{f32::consts::FRAC_PI_2, io::Write, path::Path};
 
+use glam::{Mat4, Quat, Vec3};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Value, json};
 
@@ -29,7 +28,10 @@ use super::{
     parts::{self, Parts},
     subject::Subject,
 };
-use crate::{Scene, files};
+use crate::{
+    Camera, FilmSettings, Filter, Lamp, Scene, files,
+    lamp::{LampKind, SpotFalloff},
+};
 
 /// Characters of a name that a URI writes otherwise (RFC 3986).
 const IN_URI: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
@@ -51,10 +53,10 @@ pub fn export<'a>(scene: &'a Scene, path: &Path) -> Export<'a> {
     let materials: Vec<Value> = materials.collect();
     let size = parts::bounds(&parts).map_or(1.0, |[low, high]| low.distance(high));
     let near = 1e-4 * size.max(1e-6);
-    let [camera, node] = nodes::camera(&scene.camera, &scene.film, near, &mut warnings);
+    let [camera, node] = camera_nodes(&scene.camera, &scene.film, near, &mut warnings);
     let (mut lights, mut nodes) = (Vec::new(), vec![node]);
     for (index, lamp) in scene.lamps.iter().enumerate() {
-        let [light, node] = nodes::lamp(lamp, index, &mut warnings);
+        let [light, node] = lamp_nodes(lamp, index, &mut warnings);
         lights.push(light);
         nodes.push(node);
     }
@@ -128,4 +130,69 @@ fn meshes(scene: &Scene, parts: &[Parts]) -> (Vec<Value>, Buffer) {
         }
     }
     (meshes, buffer)
+}
+
+/// Returns the camera of a film, and its node; warns of what glTF's has not. `near` is the distance of
+/// its near plane, metres.
+fn camera_nodes(
+    camera: &Camera,
+    film: &FilmSettings,
+    near: f32,
+    warnings: &mut Vec<String>,
+) -> [Value; 2] {
+    if camera.aperture_radius > 0.0 {
+        warnings.push("camera: glTF has no lens; all distances are in focus".to_owned());
+    }
+    if film.filter == Filter::Box {
+        warnings.push("film: glTF has no filter; readers do not take the box".to_owned());
+    }
+    let forward = (camera.look_at - camera.position).normalize_or(Vec3::NEG_Z);
+    let right = forward.cross(camera.up).try_normalize();
+    let right = right.unwrap_or_else(|| forward.any_orthonormal_vector());
+    let axes = [right, right.cross(forward), -forward].map(|axis| axis.extend(0.0));
+    let matrix = Mat4::from_cols(axes[0], axes[1], axes[2], camera.position.extend(1.0));
+    let lens = json!({"type": "perspective", "name": "camera", "perspective": {
+        "yfov": camera.vertical_fov_deg.to_radians(),
+        "aspectRatio": f64::from(film.width) / f64::from(film.height), "znear": near}});
+    [lens, json!({"name": "camera", "camera": 0, "matrix": matrix.to_cols_array()})]
+}
+
+/// Returns a light and its node, which names it as `index`.
+fn lamp_nodes(lamp: &Lamp, index: usize, warnings: &mut Vec<String>) -> [Value; 2] {
+    let (kind, place, direction, color) = match lamp.kind {
+        LampKind::Point { position, intensity } => ("point", position, Vec3::NEG_Z, intensity),
+        LampKind::Directional { direction, irradiance } => {
+            ("directional", Vec3::ZERO, direction, irradiance)
+        }
+        LampKind::Spot(spot) => ("spot", spot.position, spot.direction, spot.intensity),
+    };
+    let intensity = color.max_element();
+    let color = if intensity > 0.0 { color / intensity } else { Vec3::ONE };
+    let mut light = json!({"type": kind, "color": color.to_array(), "intensity": intensity});
+    if !lamp.name.is_empty() {
+        light["name"] = lamp.name.clone().into();
+    }
+    if let LampKind::Spot(spot) = lamp.kind {
+        if spot.falloff != SpotFalloff::SquaredCosine {
+            warnings.push(format!(
+                "lamp `{}`: between its two angles glTF's spot falls off by t², with t linear in the \
+                 cosine, Fenestra's by another curve",
+                lamp.name
+            ));
+        }
+        if spot.outer_angle_rad > FRAC_PI_2 {
+            warnings.push(format!(
+                "lamp `{}`: glTF's spots reach to 90°, this one to {:.1}°",
+                lamp.name,
+                spot.outer_angle_rad.to_degrees()
+            ));
+        }
+        let outer = spot.outer_angle_rad.min(FRAC_PI_2);
+        let inner = spot.inner_angle_rad.min(0.999 * outer);
+        light["spot"] = json!({"innerConeAngle": inner, "outerConeAngle": outer});
+    }
+    let turn = Quat::from_rotation_arc(Vec3::NEG_Z, direction.normalize_or(Vec3::NEG_Z));
+    let node = json!({"translation": place.to_array(), "rotation": turn.to_array(),
+        "extensions": {"KHR_lights_punctual": {"light": index}}});
+    [light, node]
 }

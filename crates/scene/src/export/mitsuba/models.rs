@@ -10,9 +10,8 @@ use glam::Vec3;
 use crate::{
     coat::{LossyCoat, normal_reflectance, principled_base_factor},
     export::{
-        folder::Folder,
+        folder::{Attributes, Folder, SAME_UV},
         images::{Pictures, Recipe},
-        ply::{Attributes, SAME_UV},
         subject::{Opacity, Subject, difference_of_index, index_of},
         triple,
     },

@@ -8,9 +8,8 @@ use super::triple;
 use crate::{
     coat::{COAT_IOR, base_below_coat},
     export::{
-        folder::Folder,
+        folder::{Attributes, Folder},
         images::{Pictures, Recipe},
-        ply::Attributes,
         subject::{Opacity, Subject, index_of},
     },
     material::{ConductorFresnel, MaterialKind},

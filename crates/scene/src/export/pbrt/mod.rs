@@ -6,17 +6,17 @@
 //!   same colour shows through a smooth coat.
 //! - A `conductor` has Fresnel's equations, never Schlick's approximation.
 //! - Principled materials become a conductor or a `coateddiffuse`, measured ones diffuse.
-//! - Further ones are where the warnings are, in `materials` and `lights`.
+//! - Further ones are where the warnings are, in `materials` and here.
 //!
 //! Differences too small for a warning: the environment is resampled to an equal-area map, whose nearest
 //! texel pbrt looks up; pbrt subtracts from its Gaussian filter the value at 1.5 pixels.
 
-mod lights;
 mod materials;
 
 use std::{fmt::Write, path::Path};
 
-use glam::Vec3;
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
 
 use self::materials::{Model, Translator, rgb};
 use super::{
@@ -27,7 +27,13 @@ use super::{
     left_out, parts,
     subject::Subject,
 };
-use crate::{Camera, FilmSettings, Filter, Scene, files};
+use crate::{
+    Camera, EnvironmentMap, FilmSettings, Filter, Lamp, Scene,
+    error::Result,
+    files,
+    lamp::{LampKind, SpotFalloff},
+    math::equal_area::direction_from_square,
+};
 
 /// Translates the materials and lamps for a scene file at `path`, without writing anything.
 pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'a> {
@@ -47,14 +53,14 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
         translator.model()
     });
     let models: Vec<Model> = models.collect();
-    let lamps: String = scene.lamps.iter().map(|lamp| lights::lamp(lamp, &mut warnings)).collect();
+    let lamps: String = scene.lamps.iter().map(|lamp| light_source(lamp, &mut warnings)).collect();
     warnings.extend(left_out(scene));
     let path = path.to_owned();
     Export::new(warnings, move || {
         let mut text = format!("# Written by Fenestra {}.\n", env!("CARGO_PKG_VERSION"));
         text += &view(scene, settings, &folder.name);
         text += "\nWorldBegin\n";
-        text += &lights::write_environment(&scene.environment, &folder)?;
+        text += &write_environment(&scene.environment, &folder)?;
         text += &lamps;
         pictures.write(&folder.path)?;
         for (index, parts) in parts.iter().enumerate() {
@@ -130,4 +136,77 @@ fn triple(vector: Vec3) -> String {
 /// Text of a string in quotes.
 fn escaped(text: &str) -> String {
     text.replace('\\', "\\\\").replace('"', "\\\"")
+}
+
+/// Sides of the square map, texels.
+const SIDES: (u32, u32) = (64, 4096);
+/// Points of a texel of a square map with twice the rows of the other, along each side, whose mean it is.
+const POINTS: u32 = 3;
+
+/// Returns the light source of a lamp, and warns where it is not Fenestra's.
+fn light_source(lamp: &Lamp, warnings: &mut Vec<String>) -> String {
+    match lamp.kind {
+        LampKind::Point { position, intensity } => format!(
+            "LightSource \"point\" \"rgb I\" [{}] \"point3 from\" [{}]\n",
+            triple(intensity),
+            triple(position)
+        ),
+        LampKind::Directional { direction, irradiance } => format!(
+            "LightSource \"distant\" \"rgb L\" [{}] \"point3 from\" [0 0 0] \"point3 to\" [{}]\n",
+            triple(irradiance),
+            triple(direction)
+        ),
+        LampKind::Spot(spot) => {
+            if spot.falloff != SpotFalloff::SmoothCosine {
+                warnings.push(format!(
+                    "lamp `{}`: between its two angles pbrt's spot falls off by 3t² − 2t³, with t \
+                     linear in the cosine, Fenestra's by another curve",
+                    lamp.name
+                ));
+            }
+            let DVec3 { x, y, z } = spot.position.as_dvec3() + spot.direction.as_dvec3();
+            let [inner, outer] = [spot.inner_angle_rad, spot.outer_angle_rad]
+                .map(|angle| f64::from(angle).to_degrees());
+            format!(
+                "LightSource \"spot\" \"rgb I\" [{}] \"point3 from\" [{}]\n    \
+                 \"point3 to\" [{x} {y} {z}] \"float coneangle\" {outer} \"float conedeltaangle\" {}\n",
+                triple(spot.intensity),
+                triple(spot.position),
+                outer - inner
+            )
+        }
+    }
+}
+
+/// Writes the environment into `folder` and returns its light source; black ones need none.
+///
+/// A square equal-area map twice as high as the lat-long one has texels smaller than those at its
+/// horizon. The directions of the map are those of the world.
+fn write_environment(map: &EnvironmentMap, folder: &Folder) -> Result<String> {
+    if map.is_black() {
+        return Ok(String::new());
+    }
+    if let Some(radiance) = map.uniform_radiance() {
+        return Ok(format!("LightSource \"infinite\" \"rgb L\" [{}]\n", triple(radiance)));
+    }
+    let (side, texels) = equal_area(map);
+    let file = folder.write_environment([side; 2], |column, row| texels[row * side + column])?;
+    Ok(format!("LightSource \"infinite\" \"string filename\" \"{file}\"\n"))
+}
+
+/// Side and rows of the map as an equal-area square, in the directions of the world.
+fn equal_area(map: &EnvironmentMap) -> (usize, Vec<Vec3>) {
+    let side = map.height.saturating_mul(2).clamp(SIDES.0, SIDES.1);
+    let points = POINTS * map.height.saturating_mul(2).div_ceil(side);
+    let texel = |index: u32| {
+        let corner = Vec2::new((index % side) as f32, (index / side) as f32);
+        let point = |index: u32| {
+            let inside = Vec2::new((index % points) as f32, (index / points) as f32) + 0.5;
+            let place = (corner + inside / points as f32) / side as f32;
+            map.radiance(direction_from_square(place))
+        };
+        let sum: Vec3 = (0..points * points).map(point).sum();
+        sum / (points * points) as f32
+    };
+    (side as usize, (0..side * side).into_par_iter().map(texel).collect())
 }

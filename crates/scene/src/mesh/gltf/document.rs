@@ -9,13 +9,13 @@ use base64::{
 use gltf::{
     Document, Glb,
     buffer::Source,
-    json::{Root, validation::Checked},
+    json::{Index, Root, validation::Checked},
     mesh::Semantic,
 };
 use percent_encoding::percent_decode_str;
 use serde_json::{Value, json};
 
-use super::{compression, variants};
+use super::compression;
 use crate::{
     beside::Folder,
     error::{Error, Result},
@@ -82,7 +82,7 @@ pub(super) fn parse(
     }
     complete_positions(path, &mut root)?;
     if let Some(name) = variant {
-        variants::choose(name, &mut json, &mut root)
+        choose_variant(name, &mut json, &mut root)
             .map_err(|message| Error::format(path, message))?;
     }
     Ok((
@@ -208,4 +208,44 @@ fn complete(json: &mut Value) {
             channels.retain(|channel| !channel["target"]["node"].is_null());
         }
     }
+}
+
+/// Other materials of primitives, by name.
+const VARIANTS: &str = "KHR_materials_variants";
+
+pub(super) fn variant_names(json: &Value) -> Vec<String> {
+    let variants = json["extensions"][VARIANTS]["variants"].as_array();
+    let name = |variant: &Value| variant["name"].as_str().unwrap_or_default().to_owned();
+    variants.into_iter().flatten().map(name).collect()
+}
+
+/// Gives primitives the materials of the variant `name`, and removes the choice from them.
+///
+/// # Errors
+/// A message that names the variants, for an unknown one.
+fn choose_variant(name: &str, json: &mut Value, root: &mut Root) -> Result<(), String> {
+    let names = variant_names(json);
+    let Some(chosen) = names.iter().position(|own| own == name) else {
+        let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        return Err(format!("--variant {name}: there is no such variant, the file has {known}"));
+    };
+    for (index, mesh) in root.meshes.iter_mut().enumerate() {
+        for (part, primitive) in mesh.primitives.iter_mut().enumerate() {
+            let extensions =
+                json["meshes"][index]["primitives"][part]["extensions"].as_object_mut();
+            let Some(own) = extensions.and_then(|extensions| extensions.remove(VARIANTS)) else {
+                continue;
+            };
+            let holds = |mapping: &&Value| {
+                let variants = mapping["variants"].as_array();
+                variants.is_some_and(|all| all.iter().any(|v| v.as_u64() == Some(chosen as u64)))
+            };
+            let mut mappings = own["mappings"].as_array().into_iter().flatten();
+            if let Some(mapping) = mappings.find(holds) {
+                let material = mapping["material"].as_u64().unwrap_or(u64::MAX);
+                primitive.material = u32::try_from(material).ok().map(Index::new);
+            }
+        }
+    }
+    Ok(())
 }

@@ -5,16 +5,15 @@ use serde_json::Value as Json;
 
 use super::{GltfReader, contents::ignore_extensions};
 use crate::{
-    coat::COAT_IOR,
+    coat::{COAT_IOR, DEFAULT_IOR, DIELECTRIC, metallic_roughness},
     error::Result,
     features::{self, Feature, Ignored},
-    gloss::{DEFAULT_IOR, DIELECTRIC, metallic_roughness},
     import::{Value, sheet},
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
-    mesh::{MeshMaterial, images::opacity_of, label},
+    mesh::{MeshMaterial, label},
     texture::{
         Channels, Encoding, TextureUse,
-        texelwise::{Texelwise, lie_alike},
+        linear::{Texelwise, lie_alike, opacity_of},
     },
 };
 

@@ -12,9 +12,7 @@ mod document;
 mod lamps;
 mod material;
 mod primitive;
-mod skin;
 mod textures;
-mod variants;
 
 use std::{
     collections::{HashMap, HashSet},
@@ -24,9 +22,10 @@ use std::{
 
 use glam::Mat4;
 use gltf::{Document, Node, buffer::Source};
+use primitive::Place;
 use serde_json::Value;
 
-use self::{material::Pane, skin::Place};
+use self::material::Pane;
 use super::{Mesh, MeshCamera};
 use crate::{
     error::{Error, Result},
@@ -94,7 +93,7 @@ pub fn read(
         Source::Uri(uri) if !uri.starts_with("data:") => document::beside(path, uri).ok(),
         _ => None,
     });
-    reader.mesh.variants = variants::names(&json);
+    reader.mesh.variants = document::variant_names(&json);
     reader.mesh.side_files = buffer_files.collect();
     reader.read_scene(time)?;
     let mut mesh = reader.mesh;

@@ -2,17 +2,16 @@
 
 use glam::Vec3;
 
-use super::{LibraryMaterial, map::Map};
+use super::{LibraryMaterial, Map};
 use crate::{
-    coat::COAT_IOR,
+    coat::{COAT_IOR, DEFAULT_IOR},
     features::{self, Feature},
-    gloss::DEFAULT_IOR,
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
-    mesh::{
-        MeshMaterial,
-        images::{has_alpha, holds_normals, opacity_of},
+    mesh::MeshMaterial,
+    texture::{
+        Channels, Encoding, TextureCache,
+        linear::{has_alpha, holds_normals, opacity_of},
     },
-    texture::{Channels, Encoding, TextureCache},
 };
 
 /// Roughness of a material that states no more than its metallic share.
