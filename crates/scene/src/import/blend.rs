@@ -34,7 +34,7 @@ pub(crate) fn mixed(
     }
     let share = match share {
         Value::Constant(share) => share.x,
-        Value::Image(_) => 0.5,
+        _ => 0.5,
     };
     let loss = (share > 0.0 && share < 1.0).then_some(lesser);
     (if share <= 0.5 { first } else { second }, loss)
@@ -76,7 +76,7 @@ fn blend(
             (Vec3::ONE, Some(TextureUse { scale: scale.to_array(), ..mixed }))
         }
         (Value::Image(share), None, None) => (Vec3::ONE, Some(numbers(share).affine(*b - *a, *a))),
-        (Value::Image(_), ..) => return None,
+        _ => return None,
     };
     let surface = Surface { color, ..rest(own) };
     Some((MaterialKind::Diffuse { reflectance }, surface))

@@ -56,6 +56,8 @@ pub(crate) enum Value {
     /// The same everywhere; all three are equal for a number.
     Constant(Vec3),
     Image(TextureUse),
+    /// Colours of the vertices, times a factor.
+    Vertices(Vec3),
 }
 
 impl Value {
@@ -68,6 +70,7 @@ impl Value {
         match self {
             Self::Constant(value) => Self::Constant(value * factor + shift),
             Self::Image(image) => Self::Image(image.affine(factor, shift)),
+            Self::Vertices(value) => Self::Vertices(value * factor + shift),
         }
     }
 
@@ -77,8 +80,25 @@ impl Value {
 
     pub(crate) fn image(&self) -> Option<&TextureUse> {
         match self {
-            Self::Constant(_) => None,
             Self::Image(image) => Some(image),
+            _ => None,
+        }
+    }
+
+    /// Factor for the model and texture for the surface.
+    pub(crate) fn split(self) -> (Vec3, Option<TextureUse>) {
+        match self {
+            Self::Constant(value) | Self::Vertices(value) => (value, None),
+            Self::Image(image) => (Vec3::ONE, Some(image)),
+        }
+    }
+
+    /// Value of which every colour is `of` the former one; colours of vertices take it of the factor.
+    pub(crate) fn mapped(self, of: impl Fn(f32) -> f32 + Sync) -> Self {
+        match self {
+            Self::Constant(value) => Self::Constant(value.map(of)),
+            Self::Image(image) => Self::Image(image.mapped(of)),
+            Self::Vertices(value) => Self::Vertices(value.map(of)),
         }
     }
 
@@ -90,7 +110,7 @@ impl Value {
     /// Value and opacity at a texel of a grid that the image, if it is one, lies on.
     pub(crate) fn at(&self, grid: &Texelwise, index: usize) -> Vec4 {
         match self {
-            Self::Constant(value) => value.extend(1.0),
+            Self::Constant(value) | Self::Vertices(value) => value.extend(1.0),
             Self::Image(image) => grid.texel(image, index),
         }
     }
@@ -119,9 +139,10 @@ impl Value {
         (combined, any_mean)
     }
 
-    fn mean(&self) -> Vec3 {
+    /// Mean, which is that of the factor for colours of vertices.
+    pub(crate) fn mean(&self) -> Vec3 {
         match self {
-            Self::Constant(value) => *value,
+            Self::Constant(value) | Self::Vertices(value) => *value,
             Self::Image(image) => image.mean().into(),
         }
     }

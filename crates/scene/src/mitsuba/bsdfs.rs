@@ -7,14 +7,14 @@ use super::{
     document::Node,
     parameters::{Parameters, float, value},
     spectra::{self, Role},
-    textures::{MAX_SCALES, Value},
+    textures::MAX_SCALES,
 };
 use crate::{
     MIN_ALPHA,
     coat::{COAT_IOR, LossyCoat, albedo_below_coat},
     error::Result,
     features,
-    import::{SOLID_IOR, Width, blend::numbers, media},
+    import::{SOLID_IOR, Value, Width, blend::numbers, media},
     material::{ConductorFresnel, Material, MaterialKind, Surface},
     math::colour::luminance,
 };
@@ -30,7 +30,7 @@ fn one_sided(kind: MaterialKind) -> Material {
 
 /// Material whose first factor is `value`.
 pub(super) fn colored(value: Value, kind: impl FnOnce(Vec3) -> MaterialKind) -> Material {
-    let is_of_vertices = value.is_of_vertices();
+    let is_of_vertices = matches!(value, Value::Vertices(_));
     let (factor, texture) = value.split();
     let mut model = one_sided(kind(factor));
     model.surface.color = texture;
@@ -197,7 +197,7 @@ impl Reader {
         }
         parameters.without_effect("flip_invalid_normals use_shadowing_function");
         match self.value(parameters, "normalmap", Role::Index)? {
-            Some(Value::Texture(texture)) => model.surface.normal = Some(texture),
+            Some(Value::Image(texture)) => model.surface.normal = Some(texture),
             _ => return Err(parameters.node.error("normalmap: expected the texture `normalmap`")),
         }
         Ok(model)
@@ -209,8 +209,8 @@ impl Reader {
         for texture in parameters.objects("texture")? {
             match self.texture(texture, MAX_SCALES)? {
                 // One height everywhere bends nothing.
-                Value::Color(_) => {}
-                Value::Texture(heights) if model.surface.normal.is_none() => {
+                Value::Constant(_) => {}
+                Value::Image(heights) if model.surface.normal.is_none() => {
                     let heights = heights.affine(scale, Vec3::ZERO);
                     model.surface.normal = Some(self.reliefs.keep(heights));
                 }
@@ -240,15 +240,14 @@ impl Reader {
         let node = parameters.node;
         let mut width = |name: &str| self.value(parameters, name, Role::Index);
         let value = match (width("alpha_u")?, width("alpha_v")?) {
-            (Some(Value::Color(u)), Some(Value::Color(v))) => {
+            (Some(Value::Constant(u)), Some(Value::Constant(v))) => {
                 if u != v {
                     self.ignored.add(features::MI_ANISOTROPIC, || node.place());
                 }
-                Some(Value::Color(0.5 * (u + v)))
+                Some(Value::Constant(0.5 * (u + v)))
             }
             (Some(one), other) => {
-                if !matches!((&one, &other), (Value::Texture(u), Some(Value::Texture(v))) if u == v)
-                {
+                if !matches!((&one, &other), (Value::Image(u), Some(Value::Image(v))) if u == v) {
                     self.ignored.add(features::MI_ANISOTROPIC, || node.place());
                 }
                 Some(one)
@@ -256,7 +255,7 @@ impl Reader {
             (None, one) => one.or(width("alpha")?),
         };
         Ok(match value {
-            Some(Value::Texture(texture)) => {
+            Some(Value::Image(texture)) => {
                 let root = |alpha: f32| alpha.clamp(MIN_ALPHA, 1.0).sqrt();
                 Width { alpha: 1.0, texture: Some(numbers(&texture).mapped(root)) }
             }
@@ -300,7 +299,7 @@ impl Reader {
         let ior = self.ior(parameters, "polypropylene")?;
         let mut value = self.value_or(parameters, "diffuse_reflectance", Role::Reflectance, 0.5)?;
         let specular = self.value(parameters, "specular_reflectance", Role::Reflectance)?;
-        if !matches!(specular, None | Some(Value::Color(Vec3::ONE))) {
+        if !matches!(specular, None | Some(Value::Constant(Vec3::ONE))) {
             self.ignored.add(features::MI_SPECULAR, || node.place());
         }
         let is_nonlinear = parameters.boolean("nonlinear")?.unwrap_or(false);
@@ -370,7 +369,7 @@ impl Reader {
         };
         let (eta, k) = (eta.max(Vec3::splat(0.01)) / outside, k / outside);
         let fresnel = ConductorFresnel::Exact { eta, k };
-        if matches!(value, Value::Color(Vec3::ONE)) {
+        if matches!(value, Value::Constant(Vec3::ONE)) {
             return Ok(one_sided(MaterialKind::Conductor { alpha: width, fresnel }));
         }
         let normal = fresnel.at_normal_incidence();

@@ -14,13 +14,13 @@ use super::{
     document::Node,
     parameters::{Parameters, turned},
     spectra::{self, Role},
-    textures::Value,
 };
 use crate::{
     EnvironmentMap, Lamp,
     environment::{Daylight, Moment, SUN_RADIUS_DEG},
     error::Result,
     features,
+    import::Value,
     lamp::{LampKind, Spot, SpotFalloff},
     material::{Emission, MaterialKind},
     math::frame::direction_from_lat_long,
@@ -85,7 +85,7 @@ impl Reader {
         let outer = parameters.float_in("cutoff_angle", (0.01, 179.0))?.unwrap_or(20.0);
         let inner = parameters.float_in("beam_width", (0.0, 179.0))?.unwrap_or(0.75 * outer);
         let texture = self.value(parameters, "texture", Role::Reflectance)?;
-        if matches!(texture, Some(Value::Texture(_))) {
+        if matches!(texture, Some(Value::Image(_))) {
             self.ignored.add(features::MI_SPOT_TEXTURE, || node.place());
         }
         let factor = texture.map_or(Vec3::ONE, |texture| texture.mean());
@@ -111,7 +111,7 @@ impl Reader {
         let value = self.value_or(&parameters, "radiance", Role::Light, 1.0)?;
         parameters.without_effect("sampling_weight");
         parameters.finish(&mut self.ignored);
-        if value.is_of_vertices() {
+        if matches!(value, Value::Vertices(_)) {
             return Err(node.error("radiance: expected a colour or a bitmap, found vertex colours"));
         }
         let (radiance, texture) = value.split();

@@ -8,14 +8,13 @@ use super::{
     document::Node,
     parameters::{Parameters, numbers},
     spectra::Role,
-    textures::Value,
 };
 use crate::{
     MIN_ALPHA,
     coat::{COAT_IOR, DIELECTRIC},
     error::Result,
     features,
-    import::{self, Width, blend::mixed},
+    import::{Value, Width, blend::mixed},
     material::{Material, MaterialKind, Principled},
     math::colour::luminance,
 };
@@ -31,11 +30,7 @@ impl Reader {
         let weight = self.value_or(parameters, "weight", Role::Reflectance, 0.5)?;
         if second.kind() == "null" {
             let mut model = self.model(first)?;
-            let opacity = match weight {
-                Value::Color(weight) | Value::Vertices(weight) => Value::Color(Vec3::ONE - weight),
-                Value::Texture(texture) => Value::Texture(texture.affine(Vec3::NEG_ONE, Vec3::ONE)),
-            };
-            self.cut(&mut model, node, opacity);
+            self.cut(&mut model, node, weight.affine(Vec3::NEG_ONE, Vec3::ONE));
             return Ok(model);
         }
         if first.kind() == "null" {
@@ -45,18 +40,18 @@ impl Reader {
         }
         let pair = [self.model(first)?, self.model(second)?];
         let share = match weight.split() {
-            (_, Some(image)) => import::Value::Image(image),
-            (weight, None) => import::Value::number(luminance(weight).clamp(0.0, 1.0).into()),
+            (_, Some(image)) => Value::Image(image),
+            (weight, None) => Value::number(luminance(weight).clamp(0.0, 1.0).into()),
         };
         Ok(self.mixed(node, pair, &share))
     }
 
     /// Mixture of two models; the greater of them if they do not mix.
-    fn mixed(&mut self, node: Node<'_>, pair: [Material; 2], share: &import::Value) -> Material {
+    fn mixed(&mut self, node: Node<'_>, pair: [Material; 2], share: &Value) -> Material {
         let [first, second] = pair;
         match share {
-            import::Value::Constant(Vec3::ZERO) => return first,
-            import::Value::Constant(Vec3::ONE) => return second,
+            Value::Constant(Vec3::ZERO) => return first,
+            Value::Constant(Vec3::ONE) => return second,
             _ => {}
         }
         let losses = [features::MI_BLEND_LOBES, features::MI_BLEND];
@@ -82,7 +77,7 @@ impl Reader {
             let share = if sum > 0.0 { weight.max(0.0) / sum } else { 0.0 };
             mixed = Some(match mixed {
                 None => model,
-                Some(before) => self.mixed(node, [before, model], &import::Value::number(share)),
+                Some(before) => self.mixed(node, [before, model], &Value::number(share)),
             });
         }
         if (sum - 1.0).abs() > 1e-3 {

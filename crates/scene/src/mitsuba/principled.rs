@@ -2,12 +2,13 @@
 
 use glam::Vec3;
 
-use super::{Reader, bsdfs::colored, parameters::Parameters, spectra::Role, textures::Value};
+use super::{Reader, bsdfs::colored, parameters::Parameters, spectra::Role};
 use crate::{
     MIN_ALPHA,
     coat::{COAT_IOR, normal_reflectance, principled_base_factor},
     error::Result,
     features,
+    import::Value,
     material::{Material, MaterialKind, Principled},
     math::colour::luminance,
 };
@@ -24,7 +25,7 @@ impl Reader {
     ) -> Result<()> {
         for name in names {
             let value = self.value_or(parameters, name, Role::Index, 0.0)?;
-            if !matches!(value, Value::Color(Vec3::ZERO)) {
+            if !matches!(value, Value::Constant(Vec3::ZERO)) {
                 let place = || parameters.node.place();
                 self.ignored.add_named(features::MI_PRINCIPLED_REST, &format!("`{name}`"), place);
             }
@@ -56,12 +57,12 @@ impl Reader {
                 (1.0 + root) / (1.0 - root)
             }
         };
-        let is_metal = matches!(&metallic, Value::Color(share) if share.x >= 0.5);
+        let is_metal = matches!(&metallic, Value::Constant(share) if share.x >= 0.5);
         let share = match &spec_trans {
-            Value::Color(share) => share.x,
-            Value::Texture(_) | Value::Vertices(_) => 0.5,
+            Value::Constant(share) => share.x,
+            Value::Image(_) | Value::Vertices(_) => 0.5,
         };
-        let is_whole = matches!(&metallic, Value::Color(Vec3::ZERO)) && share == 1.0;
+        let is_whole = matches!(&metallic, Value::Constant(Vec3::ZERO)) && share == 1.0;
         if share > 0.0 && !is_whole {
             self.ignored.add(features::MI_SPEC_TRANS, || node.place());
         }

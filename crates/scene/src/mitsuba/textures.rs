@@ -13,52 +13,12 @@ use super::{
 use crate::{
     error::Result,
     features::{self, Ignored},
+    import::Value,
     texture::{Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
 };
 
 /// Most `scale` textures around one another.
 pub(super) const MAX_SCALES: usize = 8;
-
-/// Value that may vary over a surface.
-#[derive(Clone, Debug)]
-pub(super) enum Value {
-    /// The same everywhere.
-    Color(Vec3),
-    Texture(TextureUse),
-    /// Colours of the vertices, times a factor.
-    Vertices(Vec3),
-}
-
-impl Value {
-    /// Factor for the model and texture for the surface.
-    pub(super) fn split(self) -> (Vec3, Option<TextureUse>) {
-        match self {
-            Self::Color(color) | Self::Vertices(color) => (color, None),
-            Self::Texture(texture) => (Vec3::ONE, Some(texture)),
-        }
-    }
-
-    /// Value of which every colour is `of` the former one; colours of vertices take it of the factor.
-    pub(super) fn mapped(self, of: impl Fn(f32) -> f32 + Sync) -> Self {
-        match self {
-            Self::Color(color) => Self::Color(color.map(of)),
-            Self::Vertices(color) => Self::Vertices(color.map(of)),
-            Self::Texture(texture) => Self::Texture(texture.mapped(of)),
-        }
-    }
-
-    /// Mean, which is that of the factor for colours of vertices.
-    pub(super) fn mean(&self) -> Vec3 {
-        match self {
-            Self::Color(color) | Self::Vertices(color) => *color,
-            Self::Texture(texture) => texture.mean().into(),
-        }
-    }
-
-    pub(super) fn is_of_vertices(&self) -> bool {
-        matches!(self, Self::Vertices(_))
-    }
-}
 
 impl Reader {
     /// Colour or texture of a parameter, if it is there.
@@ -73,16 +33,15 @@ impl Reader {
             "texture" => {
                 let value = self.texture(node, MAX_SCALES)?;
                 Ok(Some(match value {
-                    Value::Color(color) if role == Role::Reflectance => {
-                        Value::Color(color.min(Vec3::ONE))
+                    Value::Constant(color) if role == Role::Reflectance => {
+                        Value::Constant(color.min(Vec3::ONE))
                     }
                     value => value,
                 }))
             }
-            _ if role == Role::Reflectance => {
-                spectra::reflectance(node, &mut self.ignored).map(|color| Some(Value::Color(color)))
-            }
-            _ => spectra::color(node, role).map(|color| Some(Value::Color(color))),
+            _ if role == Role::Reflectance => spectra::reflectance(node, &mut self.ignored)
+                .map(|color| Some(Value::Constant(color))),
+            _ => spectra::color(node, role).map(|color| Some(Value::Constant(color))),
         }
     }
 
@@ -95,17 +54,17 @@ impl Reader {
         otherwise: f32,
     ) -> Result<Value> {
         let value = self.value(parameters, name, role)?;
-        Ok(value.unwrap_or(Value::Color(Vec3::splat(otherwise))))
+        Ok(value.unwrap_or(Value::Constant(Vec3::splat(otherwise))))
     }
 
     pub(super) fn texture(&mut self, node: Node<'_>, scales_left: usize) -> Result<Value> {
         let parameters = Parameters::new(node);
         let value = match node.kind() {
             "bitmap" | "ldrtexture" => match self.bitmap(&parameters)? {
-                Some(texture) => Value::Texture(texture),
-                None => Value::Color(Vec3::splat(0.5)),
+                Some(texture) => Value::Image(texture),
+                None => Value::Constant(Vec3::splat(0.5)),
             },
-            "checkerboard" => Value::Texture(checkerboard(&parameters, &mut self.ignored)?),
+            "checkerboard" => Value::Image(checkerboard(&parameters, &mut self.ignored)?),
             "mesh_attribute" | "vertexcolors" => {
                 let name = parameters.string("name")?.unwrap_or("vertex_color");
                 let scale = Vec3::splat(parameters.float("scale")?.unwrap_or(1.0));
@@ -117,7 +76,7 @@ impl Reader {
             }
             "uniform" | "srgb" | "d65" => {
                 let color = spectra::color_of_kind(node, Role::Light)?;
-                return Ok(Value::Color(color.max(Vec3::ZERO)));
+                return Ok(Value::Constant(color.max(Vec3::ZERO)));
             }
             "scale" if scales_left > 0 => self.scaled(&parameters, scales_left)?,
             found => {
@@ -131,7 +90,7 @@ impl Reader {
     fn unknown_texture(&mut self, found: &str, node: Node<'_>) -> Value {
         let name = format!("texture `{found}`, which is 0.5");
         self.ignored.add_named(features::MI_TEXTURE, &name, || node.place());
-        Value::Color(Vec3::splat(0.5))
+        Value::Constant(Vec3::splat(0.5))
     }
 
     /// Texture of version 0.6 that multiplies another.
@@ -141,11 +100,7 @@ impl Reader {
             return Err(node.error("scale: expected a texture in it, found none"));
         };
         let factor = spectra::parameter(parameters, "scale", Role::Index)?.unwrap_or(Vec3::ONE);
-        Ok(match self.texture(inner, scales_left - 1)? {
-            Value::Color(color) => Value::Color(color * factor),
-            Value::Vertices(color) => Value::Vertices(color * factor),
-            Value::Texture(texture) => Value::Texture(texture.affine(factor, Vec3::ZERO)),
-        })
+        Ok(self.texture(inner, scales_left - 1)?.affine(factor, Vec3::ZERO))
     }
 
     /// Image of a file; none if that is not there, or none that can be read.
@@ -204,13 +159,11 @@ impl Reader {
         node: Node<'_>,
         feature: features::Feature,
     ) -> Option<Vec3> {
-        match value? {
-            Value::Color(color) => Some(color),
-            Value::Texture(_) | Value::Vertices(_) => {
-                self.ignored.add(feature, || node.place());
-                None
-            }
+        if let Value::Constant(color) = value? {
+            return Some(color);
         }
+        self.ignored.add(feature, || node.place());
+        None
     }
 }
 

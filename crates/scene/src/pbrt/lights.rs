@@ -314,7 +314,7 @@ fn resample(texels: &[Vec3], side: u32, light_from_world: Mat3, source: String) 
     let mut resampled: Vec<Vec3> = (0..width * height).into_par_iter().map(texel).collect();
     let row_mean = |row: usize| -> DVec3 {
         let texels = &resampled[row * width as usize..(row + 1) * width as usize];
-        let edge = |row: usize| (std::f64::consts::PI * row as f64 / f64::from(height)).cos();
+        let edge = |row: usize| (PI * row as f64 / f64::from(height)).cos();
         let weight = 0.5 * (edge(row) - edge(row + 1)) / f64::from(width);
         texels.iter().map(|texel| texel.as_dvec3() * weight).sum()
     };

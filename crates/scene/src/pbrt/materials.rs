@@ -146,7 +146,7 @@ impl<'a> Materials<'a> {
                 self.textures.log.ignore(features::PBRT_DISPLACEMENT, &entity.place);
             }
             // One height everywhere bends nothing.
-            Some(Value::Constant(_)) | None => {}
+            _ => {}
         }
         self.textures.log.unused(entity);
         Ok(Some(Material { name, kind, surface }))
@@ -164,8 +164,7 @@ impl<'a> Materials<'a> {
     fn layers(&mut self, entity: &Entity) -> Result<()> {
         entity.without_effect("thickness maxdepth nsamples g");
         let is_clear = match self.textures.spectrum(entity, "albedo")? {
-            Some(Value::Constant(albedo)) => albedo == Vec3::ZERO,
-            Some(Value::Image(_)) => false,
+            Some(value) => value == Value::Constant(Vec3::ZERO),
             None => true,
         };
         if !is_clear {
@@ -219,7 +218,7 @@ impl<'a> Materials<'a> {
             {
                 return Ok(MaterialKind::Mirror { reflectance: Vec3::ONE });
             }
-            Some(Value::Constant(color)) => {
+            Some(Value::Constant(color) | Value::Vertices(color)) => {
                 ConductorFresnel::Exact { eta: Vec3::ONE, k: index_of_metal(color) }
             }
             None => {
@@ -297,13 +296,13 @@ impl<'a> Materials<'a> {
             self.textures.log.ignore(features::PBRT_ANISOTROPY, &entity.place);
         }
         match (along_u, along_v) {
-            (Value::Constant(u), Value::Constant(v)) => {
-                let alpha = 0.5 * (alpha_of(u.x) + alpha_of(v.x));
-                Ok(Width { alpha: alpha.min(1.0), texture: None })
-            }
             (Value::Image(image), _) | (_, Value::Image(image)) => {
                 let texture = map_numbers(&image, |roughness| alpha_of(roughness).min(1.0).sqrt());
                 Ok(Width { alpha: 1.0, texture: Some(texture) })
+            }
+            (u, v) => {
+                let alpha = 0.5 * (alpha_of(u.mean().x) + alpha_of(v.mean().x));
+                Ok(Width { alpha: alpha.min(1.0), texture: None })
             }
         }
     }
@@ -361,8 +360,8 @@ impl<'a> Materials<'a> {
 
 pub(super) fn set_opacity(surface: &mut Surface, value: Value) {
     match value {
-        Value::Constant(opacity) => surface.opacity.factor = opacity.x.clamp(0.0, 1.0),
         Value::Image(image) => surface.opacity.texture = Some(image),
+        constant => surface.opacity.factor = constant.mean().x.clamp(0.0, 1.0),
     }
 }
 
@@ -374,13 +373,9 @@ fn index_of_metal(reflectance: Vec3) -> Vec3 {
 
 /// Returns the constant colour of a model, 1 if a texture gives it.
 fn color(value: Value, surface: &mut Surface) -> Vec3 {
-    match value {
-        Value::Constant(color) => color,
-        Value::Image(image) => {
-            surface.color = Some(image);
-            Vec3::ONE
-        }
-    }
+    let (color, texture) = value.split();
+    surface.color = texture;
+    color
 }
 
 impl Materials<'_> {
