@@ -9,11 +9,7 @@ use super::{
     state::{MaterialChoice, Saved, State, States, look_at},
     tokens::{Part, Place, Source, Token},
 };
-use crate::{
-    beside::Folder,
-    error::Result,
-    features::{self, Ignored},
-};
+use crate::{beside::Folder, error::Result, features};
 
 /// Shape with the state in force at its directive.
 #[derive(Debug)]
@@ -78,20 +74,15 @@ pub(super) struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// Reads all directives of the main file `main`, whose names of files start in `folder`.
-    pub(super) fn read(main: &'a Path, folder: Folder) -> Result<(Description, Folder, Log<'a>)> {
+    pub(super) fn read(main: &'a Path, folder: Folder) -> Result<(Description, Log<'a>)> {
         let mut reader = Self {
-            source: Source::open(main, folder)?,
             states: States::default(),
             in_world: false,
             object: None,
             object_names: HashMap::new(),
             description: Description::default(),
-            log: Log {
-                main,
-                ignored: Ignored::default(),
-                inputs: Vec::new(),
-                warnings: Vec::new(),
-            },
+            log: Log::new(main, folder.clone()),
+            source: Source::open(main, folder)?,
         };
         loop {
             match reader.source.next()? {
@@ -117,8 +108,7 @@ impl<'a> Reader<'a> {
             let message = "the file ends before WorldBegin: expected a scene of pbrt-v4";
             return Err(reader.source.place().error(message));
         }
-        let Source { folder, inputs, .. } = reader.source;
-        Ok((reader.description, folder, Log { inputs, ..reader.log }))
+        Ok((reader.description, Log { inputs: reader.source.inputs, ..reader.log }))
     }
 
     fn directive(&mut self, name: &str, place: Place) -> Result<()> {

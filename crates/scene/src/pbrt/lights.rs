@@ -33,7 +33,7 @@ pub(super) struct Lights {
 
 fn color(entity: &Entity, name: &str, textures: &Textures) -> Result<Vec3> {
     let found = entity.find_of(name, &spectra::KINDS)?;
-    found.map_or(Ok(Vec3::ONE), |parameter| spectra::light(parameter, textures.folder))
+    found.map_or(Ok(Vec3::ONE), |parameter| spectra::light(parameter, &textures.log))
 }
 
 /// Reads the emission of a shape with this area, in the units of the scene.
@@ -180,7 +180,7 @@ impl Lights {
             let message = "expected either `L` or `filename`, found both";
             return Err(color.place.error(format!("{}: {message}", entity.label())));
         }
-        let path = textures.folder.file(file).map_err(|message| entity.error(message))?;
+        let path = textures.log.folder.file(file).map_err(|message| entity.error(message))?;
         let mut map = EnvironmentMap::read(&path, 1.0, &mut textures.log.warnings)
             .map_err(|error| entity.error(error.to_string()))?;
         if map.width != map.height || map.width > MAX_SIDE {

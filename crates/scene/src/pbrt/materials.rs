@@ -154,8 +154,8 @@ impl<'a> Materials<'a> {
 
     fn measured(&mut self, entity: &Entity) -> Result<MaterialKind> {
         let name = entity.required("filename")?;
-        let Textures { folder, log, .. } = &mut self.textures;
-        let path = folder.file(name).map_err(|message| entity.error(message))?;
+        let log = &mut self.textures.log;
+        let path = log.folder.file(name).map_err(|message| entity.error(message))?;
         let table = self.measured.table(&path, &mut log.inputs, &mut log.warnings)?;
         Ok(MaterialKind::Measured { path, table })
     }
@@ -223,7 +223,7 @@ impl<'a> Materials<'a> {
             }
             None => {
                 let index = |name: &str| match entity.find_of(&own(name), &spectra::KINDS)? {
-                    Some(parameter) => spectra::index(parameter, self.textures.folder),
+                    Some(parameter) => spectra::index(parameter, &self.textures.log),
                     None => {
                         Ok(media::index(&format!("metal-Cu-{name}")).unwrap_or_default().as_vec3())
                     }
@@ -268,7 +268,7 @@ impl<'a> Materials<'a> {
         let Some(parameter) = entity.find_of(name, &kinds)? else { return Ok(1.5) };
         let ior = match (parameter.kind, parameter.numbers()) {
             (Kind::Float, [ior, ..]) => *ior as f32,
-            _ => spectra::index(parameter, self.textures.folder)?.element_sum() / 3.0,
+            _ => spectra::index(parameter, &self.textures.log)?.element_sum() / 3.0,
         };
         if !(low..=high).contains(&ior) {
             let message = format!("expected a refractive index from {low} to {high}, found {ior}");
@@ -404,7 +404,7 @@ impl Materials<'_> {
     /// Absorption coefficient, per metre, of a medium that neither scatters nor emits light.
     fn absorption(&self, medium: &Entity) -> Result<Option<Vec3>> {
         let color = |name: &str| match medium.find_of(name, &spectra::KINDS)? {
-            Some(parameter) => spectra::index(parameter, self.textures.folder),
+            Some(parameter) => spectra::index(parameter, &self.textures.log),
             None => Ok(Vec3::ONE),
         };
         let is_clear = medium.string("type")? == Some("homogeneous")

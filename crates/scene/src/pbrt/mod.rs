@@ -69,12 +69,12 @@ pub(crate) fn is_pbrt(path: &Path) -> bool {
 /// [`Error::Parse`] with file, line and column for everything that cannot be read or rendered,
 /// [`Error::Io`] for the main file.
 pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
-    let (mut description, folder, mut log) = Reader::read(path, folder)?;
+    let (mut description, mut log) = Reader::read(path, folder)?;
     let asked = asked(&description, &mut log);
     let view = camera::view(&description, &mut log)?;
     // A shape's numbers are dropped when its mesh is made.
     let shapes = std::mem::take(&mut description.shapes);
-    let mut textures = Textures::new(&description, &folder, log);
+    let mut textures = Textures::new(&description, log);
     let mut lights = Lights::default();
     for (entity, world_from_light) in &description.lights {
         let placed = view.mirror * *world_from_light;
@@ -199,8 +199,8 @@ struct Builder<'a> {
 impl Builder<'_> {
     /// Makes the mesh of a shape and finds its material; none for a shape without a surface.
     fn prepare(&mut self, shape: &Shape, in_object: bool) -> Result<Option<(Mesh, u32)>> {
-        let Textures { folder, log, .. } = &mut self.materials.textures;
-        let mut mesh = shapes::mesh(&shape.entity, folder, &mut self.strands, log)?;
+        let log = &mut self.materials.textures.log;
+        let mut mesh = shapes::mesh(&shape.entity, &mut self.strands, log)?;
         if mesh.triangles.is_empty() {
             return Ok(None);
         }

@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::tokens::{Place, Source, Token};
 use crate::{
+    beside::Folder,
     error::Result,
     features::{self, Feature, Ignored},
 };
@@ -362,13 +363,20 @@ pub(super) fn read_parameters(source: &mut Source) -> Result<Vec<Parameter>> {
 /// Parts of a scene that are left out, and files read.
 pub(super) struct Log<'a> {
     pub main: &'a Path,
+    /// Folder to which all paths are relative.
+    pub folder: Folder,
     pub ignored: Ignored,
     pub inputs: Vec<PathBuf>,
     /// Warnings of the readers of other files.
     pub warnings: Vec<String>,
 }
 
-impl Log<'_> {
+impl<'a> Log<'a> {
+    pub(super) fn new(main: &'a Path, folder: Folder) -> Self {
+        let (inputs, warnings) = Default::default();
+        Self { main, folder, ignored: Ignored::default(), inputs, warnings }
+    }
+
     pub(super) fn ignore(&mut self, feature: Feature, place: &Place) {
         self.ignore_named(feature, feature.name, place);
     }

@@ -8,7 +8,6 @@ use super::{
     subdivision::{MAX_TRIANGLES, subdivide},
 };
 use crate::{
-    beside::Folder,
     error::Result,
     features,
     mesh::{Mesh, ply},
@@ -20,17 +19,12 @@ use crate::{
 const PATCH_CELLS: u32 = 16;
 
 /// Makes the mesh of a shape.
-pub(super) fn mesh(
-    entity: &Entity,
-    folder: &Folder,
-    strands: &mut Detail,
-    log: &mut Log,
-) -> Result<Mesh> {
+pub(super) fn mesh(entity: &Entity, strands: &mut Detail, log: &mut Log) -> Result<Mesh> {
     let mut mesh = match entity.name.as_str() {
         "trianglemesh" => triangle_mesh(entity, log)?,
         "plymesh" => {
             let file = entity.required("filename")?;
-            let path = folder.file(file).map_err(|message| entity.error(message))?;
+            let path = log.folder.file(file).map_err(|message| entity.error(message))?;
             if !path.exists() {
                 let name = format!("mesh `{file}`, which is not there");
                 log.ignore_named(features::PBRT_MISSING, &name, &entity.place);

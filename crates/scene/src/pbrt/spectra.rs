@@ -8,7 +8,6 @@ use glam::{DVec3, Vec3};
 
 use super::parameters::{Kind, Log, Parameter, Values};
 use crate::{
-    beside::Folder,
     error::Result,
     features, files,
     import::{clipped, media},
@@ -26,7 +25,7 @@ enum Source<'a> {
     Name(&'a str),
 }
 
-fn source<'a>(parameter: &'a Parameter, folder: &Folder) -> Result<Source<'a>> {
+fn source<'a>(parameter: &'a Parameter, log: &Log) -> Result<Source<'a>> {
     let error = |message: String| {
         parameter.place.error(format!("parameter `{}`: {message}", parameter.name))
     };
@@ -48,7 +47,7 @@ fn source<'a>(parameter: &'a Parameter, folder: &Folder) -> Result<Source<'a>> {
         (_, Values::Numbers(numbers)) => samples(numbers),
         _ => {
             let name = parameter.text();
-            let path = match folder.file(name) {
+            let path = match log.folder.file(name) {
                 Ok(path) if path.exists() || name.ends_with(".spd") => path,
                 Err(message) if name.ends_with(".spd") => return Err(error(message)),
                 _ => return Ok(Source::Name(name)),
@@ -71,8 +70,8 @@ fn unknown(parameter: &Parameter, expected: &str) -> crate::error::Error {
 }
 
 /// Reflectance, 0…1.
-pub(super) fn reflectance(parameter: &Parameter, folder: &Folder, log: &mut Log) -> Result<Vec3> {
-    let color = match source(parameter, folder)? {
+pub(super) fn reflectance(parameter: &Parameter, log: &mut Log) -> Result<Vec3> {
+    let color = match source(parameter, log)? {
         Source::Color(color) => color,
         Source::Samples(samples) => {
             let color = spectrum::reflectance(|nm| samples.at(nm));
@@ -86,8 +85,8 @@ pub(super) fn reflectance(parameter: &Parameter, folder: &Folder, log: &mut Log)
 }
 
 /// Colour of a light; that of `rgb` as given, others with luminance 1.
-pub(super) fn light(parameter: &Parameter, folder: &Folder) -> Result<Vec3> {
-    let color = match source(parameter, folder)? {
+pub(super) fn light(parameter: &Parameter, log: &Log) -> Result<Vec3> {
+    let color = match source(parameter, log)? {
         Source::Color(color) => color,
         Source::Samples(samples) => light_color(|nm| samples.at(nm)).unwrap_or(DVec3::ZERO),
         Source::Temperature(kelvin) => blackbody(kelvin),
@@ -98,8 +97,8 @@ pub(super) fn light(parameter: &Parameter, folder: &Folder) -> Result<Vec3> {
 }
 
 /// Refractive index or extinction coefficient.
-pub(super) fn index(parameter: &Parameter, folder: &Folder) -> Result<Vec3> {
-    let color = match source(parameter, folder)? {
+pub(super) fn index(parameter: &Parameter, log: &Log) -> Result<Vec3> {
+    let color = match source(parameter, log)? {
         Source::Color(color) => color,
         Source::Samples(samples) => spectrum::reflectance(|nm| samples.at(nm)),
         Source::Temperature(_) => return Err(unknown(parameter, "a refractive index")),

@@ -12,7 +12,6 @@ use super::{
     spectra,
 };
 use crate::{
-    beside::Folder,
     error::Result,
     features,
     import::Value,
@@ -27,7 +26,6 @@ const MAX_DEPTH: usize = 16;
 /// Textures of a scene, with the images read so far.
 pub(super) struct Textures<'a> {
     description: &'a Description,
-    pub(super) folder: &'a Folder,
     /// Report of all that reads materials and lights.
     pub log: Log<'a>,
     images: HashMap<(String, String), Option<Arc<Texture>>>,
@@ -38,9 +36,9 @@ pub(super) struct Textures<'a> {
 }
 
 impl<'a> Textures<'a> {
-    /// Takes the textures of `description`; paths are relative to `folder`.
-    pub(super) fn new(description: &'a Description, folder: &'a Folder, log: Log<'a>) -> Self {
-        Self { description, folder, log, images: HashMap::new(), values: HashMap::new(), depth: 0 }
+    /// Takes the textures of `description`.
+    pub(super) fn new(description: &'a Description, log: Log<'a>) -> Self {
+        Self { description, log, images: HashMap::new(), values: HashMap::new(), depth: 0 }
     }
 
     /// Spectrum of a parameter, constant or textured, if it is given.
@@ -65,7 +63,7 @@ impl<'a> Textures<'a> {
             Kind::Float | Kind::Integer => {
                 Value::number(parameter.numbers().first().copied().unwrap_or(0.0))
             }
-            _ => Value::Constant(spectra::reflectance(parameter, self.folder, &mut self.log)?),
+            _ => Value::Constant(spectra::reflectance(parameter, &mut self.log)?),
         }))
     }
 
@@ -223,7 +221,7 @@ impl<'a> Textures<'a> {
         if let Some(texture) = self.images.get(&key) {
             return texture.clone();
         }
-        let loaded = self.folder.file(file).and_then(|path| {
+        let loaded = self.log.folder.file(file).and_then(|path| {
             let texture = Texture::load(&path, &mut self.log.warnings);
             texture.map(|texture| (path, texture)).map_err(|error| error.to_string())
         });

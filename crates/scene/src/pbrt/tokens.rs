@@ -231,7 +231,7 @@ struct Open {
 /// Tokens of the main file and of the files that it includes.
 pub(super) struct Source {
     /// Folder of the main file, to which all paths are relative.
-    pub(super) folder: Folder,
+    folder: Folder,
     open: Open,
     /// Files that include the open one, the main file first.
     outer: Vec<Open>,
