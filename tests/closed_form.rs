@@ -359,12 +359,21 @@ fn lobes_are_chosen_by_a_number_of_their_own() {
     let mut scene = scenes::plane(Vec3::ONE, sky);
     scene.materials = vec![scenes::plastic(0.3)];
     scene.camera.position = Vec3::new(4.0, 5.0, 3.0);
+    let product = ProductParameters {
+        environment_lobes: 4,
+        brdf_lobes: 2,
+        views: 1,
+        brdf_share: 0.9,
+        environment_share: 0.05,
+        ..ProductParameters::default()
+    };
     let mean = |sampler| {
-        let settings = Settings { sampler, ..Settings::default() };
+        let parameters = Parameters { product, ..Parameters::default() };
+        let settings = Settings { sampler, parameters, ..Settings::default() };
         mean_and_error(&scene, &settings, 16, 12)
     };
     let [expected, expected_error] = mean(Sampler::Cosine);
-    for sampler in [Sampler::Brdf, Sampler::Mis] {
+    for sampler in [Sampler::Brdf, Sampler::Mis, Sampler::Product] {
         let [mean, error] = mean(sampler);
         let error = (error * error + expected_error * expected_error).map(f64::sqrt);
         assert_mean(sampler.name(), [mean, error], expected, 1e-4, 4e-3);
