@@ -8,7 +8,10 @@ use glam::Vec3;
 
 use crate::{
     brdf::{fresnel::*, ggx::*},
-    scene::measured::lookup::{cosine_table, half_difference_angles, measured_value, mix},
+    scene::{
+        coat::DIELECTRIC,
+        measured::lookup::{cosine_table, half_difference_angles, measured_value, mix},
+    },
     shader::{constants::*, structs::Material},
 };
 
@@ -18,7 +21,7 @@ fn mix_vec3(a: Vec3, b: Vec3, fraction: f32) -> Vec3 {
 }
 
 /// Reflectance of a coat at normal incidence, of refractive index 1.5. Twin: `glsl/include/brdf.glsl`.
-pub(super) const COAT_REFLECTANCE: f32 = 0.04;
+pub(super) const COAT_REFLECTANCE: f32 = DIELECTRIC;
 
 /// Metal and dielectric in one: `reflection` is that of GGX at unit reflectance. glTF 2.0, appendix B.
 fn principled_value(material: &Material, reflection: f32, cosine_difference: f32) -> Vec3 {

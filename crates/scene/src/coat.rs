@@ -5,6 +5,11 @@ use glam::{Vec2, Vec3};
 
 /// Refractive indices that a coat may have.
 pub(crate) const COAT_IOR: (f32, f32) = (1.01, 4.0);
+/// Reflectance at normal incidence of the dielectric of refractive index 1.5.
+pub const DIELECTRIC: f32 = 0.04;
+/// That index, which materials have that state none.
+pub(crate) const DEFAULT_IOR: f32 = 1.5;
+const TINY: f32 = 1e-6;
 
 /// Reflectance of a dielectric of refractive index `ior` ≥ 1 seen from outside; exact Fresnel.
 pub fn fresnel_dielectric(cosine: f32, ior: f32) -> f32 {
@@ -146,12 +151,6 @@ fn microfacets(alpha: f32, ior: f32, cosine: f32, reflects: bool) -> f32 {
 pub(crate) fn principled_base_factor(roughness: f32, normal: f32) -> f32 {
     (0.9522 + 0.113 * roughness) / (0.9963 * (1.0 - normal)).max(0.1)
 }
-
-/// Reflectance at normal incidence of the dielectric of refractive index 1.5.
-pub(crate) const DIELECTRIC: f32 = 0.04;
-/// That index, which materials have that state none.
-pub(crate) const DEFAULT_IOR: f32 = 1.5;
-const TINY: f32 = 1e-6;
 
 /// Base colour and share of metal that reflect as a diffuse and a specular colour do, of which the diffuse
 /// one counts as far as the specular one leaves light.

@@ -77,10 +77,10 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Names a coat, which no other format than glTF takes.
+    /// Names a coat, which is written to glTF alone.
     pub(super) fn without_coat(&mut self, material: &Principled) {
         if material.coat_weight > 0.0 {
-            self.warn(&format!("its coat is left out, for which {} has no place", self.program));
+            self.warn("its coat is left out");
         }
     }
 

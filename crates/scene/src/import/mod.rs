@@ -50,6 +50,13 @@ pub(crate) struct Width {
     pub texture: Option<TextureUse>,
 }
 
+impl Width {
+    /// √α, by the mean of an image.
+    pub(crate) fn mean_roughness(&self) -> f32 {
+        self.texture.as_ref().map_or(self.alpha.sqrt(), |texture| texture.mean()[0])
+    }
+}
+
 /// Value over a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {

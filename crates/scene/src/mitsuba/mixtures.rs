@@ -89,27 +89,26 @@ impl Reader {
     /// Coat of version 0.6 on another model: a plastic on a diffuse one, a coated material on metal.
     pub(super) fn coating(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let mut model = self.inner(parameters)?;
-        let Width { alpha, texture } = if parameters.node.kind() == "coating" {
+        let width = if parameters.node.kind() == "coating" {
             Width { alpha: MIN_ALPHA, texture: None }
         } else {
             self.width(parameters)?
         };
         let ior = self.ior(parameters, "bk7")?;
+        let coated = |reflectance, alpha| {
+            let metal = Principled::coated_metal(reflectance, alpha, width.mean_roughness());
+            MaterialKind::Principled(metal)
+        };
         match model.kind {
             MaterialKind::Diffuse { reflectance } if (COAT_IOR.0..=COAT_IOR.1).contains(&ior) => {
+                let alpha = width.alpha;
                 model.kind = MaterialKind::Plastic { diffuse: reflectance, alpha, ior };
-                model.surface.roughness = texture;
+                model.surface.roughness = width.texture;
             }
-            MaterialKind::Conductor { alpha: own, fresnel } => {
-                let coat_roughness = texture.map_or(alpha.sqrt(), |texture| texture.mean()[0]);
-                let reflectance = fresnel.at_normal_incidence();
-                let metal = Principled::coated_metal(reflectance, own, coat_roughness);
-                model.kind = MaterialKind::Principled(metal);
+            MaterialKind::Conductor { alpha, fresnel } => {
+                model.kind = coated(fresnel.at_normal_incidence(), alpha);
             }
-            MaterialKind::Mirror { reflectance } => {
-                let metal = Principled::coated_metal(reflectance, 0.0, alpha.sqrt());
-                model.kind = MaterialKind::Principled(metal);
-            }
+            MaterialKind::Mirror { reflectance } => model.kind = coated(reflectance, 0.0),
             _ => self.ignored.add(features::MI_COATING, || parameters.node.place()),
         }
         Ok(model)

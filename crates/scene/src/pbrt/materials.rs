@@ -11,7 +11,7 @@ use super::{
     tokens::Place,
 };
 use crate::{
-    coat::{COAT_IOR, albedo_below_coat},
+    coat::{COAT_IOR, DEFAULT_IOR, albedo_below_coat},
     error::Result,
     features,
     import::{SOLID_IOR, Value, Width, blend::mixed, media, relief::Reliefs, sheet},
@@ -219,7 +219,7 @@ impl<'a> Materials<'a> {
                 return Ok(MaterialKind::Mirror { reflectance: Vec3::ONE });
             }
             Some(Value::Constant(color) | Value::Vertices(color)) => {
-                ConductorFresnel::Exact { eta: Vec3::ONE, k: index_of_metal(color) }
+                ConductorFresnel::Exact { eta: Vec3::ONE, k: extinction_of_metal(color) }
             }
             None => {
                 let index = |name: &str| match entity.find_of(&own(name), &spectra::KINDS)? {
@@ -240,11 +240,10 @@ impl<'a> Materials<'a> {
     /// Metal below a coat, seen from inside of which it reflects less than from the air.
     fn coated_conductor(&mut self, entity: &Entity, surface: &mut Surface) -> Result<MaterialKind> {
         let ior = self.ior(entity, "interface.eta", (SOLID_IOR.0, COAT_IOR.1))?;
-        if (ior - 1.5).abs() > 0.01 {
+        if (ior - DEFAULT_IOR).abs() > 0.01 {
             self.textures.log.ignore(features::PBRT_COAT_INDEX, &entity.place);
         }
-        let coat = self.roughness(entity, "interface.")?;
-        let coat_roughness = coat.texture.map_or(coat.alpha.sqrt(), |texture| texture.mean()[0]);
+        let coat_roughness = self.roughness(entity, "interface.")?.mean_roughness();
         let below = |eta: Vec3, k: Vec3| {
             ConductorFresnel::Exact { eta: eta / ior, k: k / ior }.at_normal_incidence()
         };
@@ -256,7 +255,7 @@ impl<'a> Materials<'a> {
             _ => (Vec3::ONE, 0.0),
         };
         surface.color = surface.color.take().map(|texture| {
-            texture.mapped(|share| below(Vec3::ONE, index_of_metal(Vec3::splat(share))).x)
+            texture.mapped(|share| below(Vec3::ONE, extinction_of_metal(Vec3::splat(share))).x)
         });
         let metal = Principled::coated_metal(reflectance, alpha, coat_roughness);
         Ok(MaterialKind::Principled(metal))
@@ -366,7 +365,7 @@ pub(super) fn set_opacity(surface: &mut Surface, value: Value) {
 }
 
 /// Extinction coefficient of a metal of refractive index η = 1 and this reflectance, which pbrt takes for it.
-fn index_of_metal(reflectance: Vec3) -> Vec3 {
+fn extinction_of_metal(reflectance: Vec3) -> Vec3 {
     let color = reflectance.clamp(Vec3::ZERO, Vec3::splat(0.9999));
     2.0 * color.map(f32::sqrt) / (Vec3::ONE - color).map(f32::sqrt)
 }
