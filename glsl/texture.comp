@@ -2,6 +2,7 @@
 // normal maps. Later passes evaluate the BRDF with these values.
 #version 460
 
+#include "ggx.glsl"
 #include "hit_instance.glsl"
 #include "load.glsl"
 #include "path_list.glsl"
@@ -30,39 +31,61 @@ void read_textures(uint path) {
     // A loop, since drivers copy a lookup into each place that calls it.
     vec3 color = vec3(1.0);
     vec3 normal = vec3(0.0);
+    vec3 anisotropy = vec3(1.0);
     float roughness = 1.0;
     float metallic = 1.0;
-    uint count = surface.normal != NO_TEXTURE ? 4u : 3u;
+    bool has_direction = IS_ANISOTROPIC && surface.anisotropy_direction != NO_TEXTURE;
+    uint count = has_direction ? 5u : (surface.normal != NO_TEXTURE ? 4u : 3u);
     for (uint property = 0u; property < count; property++) {
         uint use_index = property == 0u ? surface.color
             : property == 1u            ? surface.roughness
             : property == 2u            ? surface.metallic
-                                        : surface.normal;
+            : property == 3u            ? surface.normal
+                                        : surface.anisotropy_direction;
         vec3 value = texture_value(use_index, attributes.uv0, attributes.uv1).rgb;
         float number = dot(value, LUMINANCE_WEIGHTS);
         color = property == 0u ? value : color;
         roughness = property == 1u ? number : roughness;
         metallic = property == 2u ? number : metallic;
-        normal = value;
+        normal = property == 4u ? normal : value;
+        anisotropy = value;
     }
     if ((surface.flags & SURFACE_VERTEX_COLOR) != 0u) {
         color *= attributes.color.rgb;
     }
-    hit_surfaces[path] = Surface(
-        clamp(material.reflectance * color, 0.0, 1.0),
-        clamp(material.alpha * roughness * roughness, min(material.alpha, SMALLEST_ALPHA), 1.0),
-        clamp(material.ior * metallic, 0.0, 1.0));
-
-    if (surface.normal != NO_TEXTURE) {
+    // The smaller of the two widths.
+    float alpha = IS_ANISOTROPIC ? material.alpha * (1.0 - length(material.anisotropy))
+                                 : material.alpha;
+    GgxWidth width = round_width(
+        clamp(alpha * roughness * roughness, min(alpha, SMALLEST_ALPHA), 1.0));
+    bool is_stretched = IS_ANISOTROPIC && surface.anisotropy != vec2(0.0);
+    if (surface.normal != NO_TEXTURE || is_stretched) {
         float side = is_back(hit.triangle, instance, ray.direction) ? -1.0 : 1.0;
         // trace.comp may have turned the normals to the other side of a sheet.
         float turn = dot(hit.geometric_normal, ray.direction) > 0.0 ? -1.0 : 1.0;
-        vec3 mapped = mapped_normal(
-            surface.normal, normal, surface.normal_scale, hit.triangle, instance, attributes,
-            turn * hit.shading_normal, side);
-        hits[path].shading_normal =
-            turn * visible_normal(mapped, turn * hit.geometric_normal, ray.direction);
+        vec3 shading_normal = hit.shading_normal;
+        if (surface.normal != NO_TEXTURE) {
+            vec3 mapped = mapped_normal(
+                surface.normal, normal, surface.normal_scale, hit.triangle, instance, attributes,
+                turn * hit.shading_normal, side);
+            shading_normal =
+                turn * visible_normal(mapped, turn * hit.geometric_normal, ray.direction);
+            hits[path].shading_normal = shading_normal;
+        }
+        if (is_stretched) {
+            vec3 front = turn * side * hit.shading_normal;
+            vec4 tangent = surface_tangent(
+                surface.anisotropy_direction, hit.triangle, instance, attributes, front);
+            vec2 axis = surface.anisotropy;
+            if (has_direction) {
+                axis = anisotropy.z * turned_by(axis, 2.0 * anisotropy.xy - 1.0);
+            }
+            width = stretched_width(width.alpha, axis, tangent, front, shading_normal);
+        }
     }
+    hit_surfaces[path] = Surface(
+        clamp(material.reflectance * color, 0.0, 1.0), width.alpha,
+        clamp(material.ior * metallic, 0.0, 1.0), width.anisotropy);
 }
 
 WALK_PATHS(read_textures)

@@ -6,11 +6,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use fenestra::{
     brdf::{MaterialTables, evaluate, fresnel, ggx},
-    scene::material::{MaterialKind, Principled},
+    scene::material::{Anisotropy, MaterialKind, Principled},
     scene::measured::lookup::cosine_table,
     shader::{constants::*, structs},
 };
-use glam::{DVec3, Vec3, vec3};
+use glam::{DVec2, DVec3, Vec3, vec3};
 use rayon::prelude::*;
 
 use crate::{
@@ -132,7 +132,9 @@ fn no_material_creates_energy() {
             "{name} at {angle}° reflects {albedo} ± {error}"
         );
         let shown = brdf::albedo(tables(), material, outgoing(angle)).as_dvec3();
-        let tolerance = DVec3::splat(0.015) + 5.0 * error;
+        // A stretched highlight is shown as one of the mean width.
+        let is_round = cases()[material].material.surface.anisotropy.strength == 0.0;
+        let tolerance = DVec3::splat(if is_round { 0.015 } else { 0.16 }) + 5.0 * error;
         assert!(
             (shown - albedo.min(DVec3::ONE)).abs().cmple(tolerance).all(),
             "{name} at {angle}°: albedo {shown} shown, {albedo} ± {error} reflected"
@@ -173,18 +175,30 @@ fn smooth_white_conductor_loses_nothing() {
 }
 
 /// Sums the light that a principled material reflects by the formulas of glTF 2.0, appendix B, and of
-/// its extensions for index and specular, written out for one pair of directions.
-fn principled_by_the_book(material: Principled, view: DVec3, light: DVec3) -> DVec3 {
+/// its extensions for index, specular and anisotropy, written out for one pair of directions. The x axis is
+/// the tangent.
+fn principled_by_the_book(
+    material: Principled,
+    Anisotropy { strength, rotation, .. }: &Anisotropy,
+    view: DVec3,
+    light: DVec3,
+) -> DVec3 {
     let Principled { base_color, metallic, roughness, ior, specular, specular_color, .. } =
         material;
     let half_vector = (view + light).normalize();
     let (alpha, base_color) = (f64::from(roughness).powi(2), base_color.as_dvec3());
-    let square = alpha * alpha;
-    let distribution =
-        square / (PI * (half_vector.z * half_vector.z * (square - 1.0) + 1.0).powi(2));
-    let visibility = 0.5
-        / (light.z * (view.z * view.z * (1.0 - square) + square).sqrt()
-            + view.z * (light.z * light.z * (1.0 - square) + square).sqrt());
+    let along = alpha + (1.0 - alpha) * f64::from(*strength).powi(2);
+    let tangent = DVec2::from_angle(f64::from(*rotation));
+    // Lengths along the tangent and across, each times a width, and along the normal.
+    let scaled = |direction: DVec3, along: f64, across: f64, normal: f64| {
+        let [x, y] = [tangent, tangent.perp()].map(|axis| axis.dot(direction.truncate()));
+        DVec3::new(along * x, across * y, normal * direction.z)
+    };
+    let area = along * alpha;
+    let inverse = area / scaled(half_vector, alpha, along, area).length_squared();
+    let distribution = area * inverse * inverse / PI;
+    let [out, into] = [view, light].map(|way| scaled(way, along, alpha, 1.0).length());
+    let visibility = 0.5 / (light.z * out + view.z * into);
     let specular_brdf = distribution * visibility;
     let rise = (1.0 - view.dot(half_vector)).powi(5);
     let metal = specular_brdf * (base_color + (DVec3::ONE - base_color) * rise);
@@ -217,11 +231,12 @@ fn principled_materials_follow_the_specification() {
             for index in 0..2_000 {
                 let (view, light) = (hemisphere(index, 21), hemisphere(index, 22));
                 let [out, into] = [view, light].map(|way| way.as_dvec3().normalize());
-                let mut expected = principled_by_the_book(book, out, into);
+                let anisotropy = &case.material.surface.anisotropy;
+                let mut expected = principled_by_the_book(book, anisotropy, out, into);
                 if book.coat_weight > 0.0 {
                     expected *= through(view) * through(light);
-                    expected +=
-                        f64::from(book.coat_weight) * principled_by_the_book(coat, out, into);
+                    expected += f64::from(book.coat_weight)
+                        * principled_by_the_book(coat, &Anisotropy::default(), out, into);
                 }
                 let found = evaluate(tables(), material, view, light).as_dvec3();
                 assert!(
@@ -232,7 +247,7 @@ fn principled_materials_follow_the_specification() {
             }
         }
     }
-    assert_eq!(seen, 10);
+    assert_eq!(seen, 12);
 }
 
 /// Coloured textures replace the colour of a material but not its tables: values, samples and albedo
@@ -270,8 +285,9 @@ fn albedo_follows_the_colour_of_the_hit() {
         }
         let expected = sum / f64::from(count);
         let shown = brdf::brdf_albedo(words, &textured, outgoing).as_dvec3();
+        let is_round = case.material.surface.anisotropy.strength == 0.0;
         assert!(
-            (shown - expected).abs().max_element() < 0.01,
+            (shown - expected).abs().max_element() < if is_round { 0.01 } else { 0.05 },
             "{}: {shown} shown, {expected} reflected",
             case.material.name
         );
@@ -437,7 +453,8 @@ fn ggx_normals_project_to_one() {
                 let slope = alpha * alpha
                     / (2.0 * tangent * (1.0 - t) * (1.0 - t))
                     / (1.0 + tangent * tangent);
-                let density = f64::from(ggx::ggx_normal_density(normal, alpha as f32));
+                let density =
+                    f64::from(ggx::ggx_normal_density(normal, ggx::GgxWidth::round(alpha as f32)));
                 density * theta.cos() * theta.sin() * 2.0 * PI * slope
             })
             .sum();

@@ -1,7 +1,10 @@
 //! `glsl/include/brdf.glsl` against its Rust twin, over all kinds of materials.
 
 use bytemuck::{Pod, Zeroable};
-use fenestra::shader::{bindings::scene, constants::MATERIAL_MEASURED};
+use fenestra::shader::{
+    bindings::scene,
+    constants::{CONSTANT_SURFACES, MATERIAL_MEASURED, SURFACES_ANISOTROPIC},
+};
 use glam::Vec3;
 
 use crate::{
@@ -62,7 +65,7 @@ fn shader_agrees_with_its_twin() {
     let queries: Vec<BrdfQuery> = (0..20_000).map(query).collect();
     let answers: Vec<BrdfAnswer> = support::run_probe(
         "brdf",
-        &[],
+        &[(CONSTANT_SURFACES, SURFACES_ANISOTROPIC)],
         &[
             (scene::MATERIALS, bytemuck::cast_slice(&tables().materials)),
             (scene::BRDF_TABLE, bytemuck::cast_slice(&tables().words)),

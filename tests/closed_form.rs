@@ -1,14 +1,17 @@
 //! Scenes whose picture is known in closed form, rendered with every sampler.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
+use std::sync::Arc;
+
 use fenestra::{
     film::Sums,
     pass::Roulette,
     sampler::{Parameters, Sampler, product::ProductParameters},
     scene::{
-        Filter, Portal, Scene,
+        EnvironmentMap, Filter, Geometry, Portal, Scene,
         lamp::LampKind,
-        material::{Emission, Material, MaterialKind},
+        material::{Anisotropy, ConductorFresnel, Emission, Material, MaterialKind},
+        texture::{Encoding, Texels, Texture, TextureUse},
     },
     session::Settings,
 };
@@ -40,6 +43,61 @@ fn assert_mean(
     let is_close = (mean / expected - 1.0).abs().max_element() < close;
     assert!(z.abs().max_element() < 7.0 || is_close, "{name}: {mean}, not {expected}, z {z}");
     assert!((error / expected).max_element() < largest_error, "{name}: error {error}");
+}
+
+/// Seen along its normal, a metal with widths a and b has 2/π · atan(a/b) of its light from the two quadrants
+/// in the middle of which a lies.
+#[test]
+fn stretched_highlights_lie_where_the_tangent_says() {
+    let _alone = support::alone();
+    // Where x and z differ in sign.
+    let quadrants = |direction: Vec3| Vec3::splat(f32::from(direction.x * direction.z < 0.0));
+    let environment = EnvironmentMap { rotation_rad: 0.0, ..scenes::environment(512, quadrants) };
+    let mut scene = scenes::plane(Vec3::ONE, environment);
+    scene.geometry = Geometry::default();
+    scenes::add_square(&mut scene.geometry, Vec3::ZERO, 1.0, 0);
+    (scene.camera.position, scene.camera.vertical_fov_deg) = (Vec3::new(0.0, 5.0, 1e-3), 0.1);
+    let (alpha, strength) = (0.02_f32, 0.3_f32);
+    let fresnel = ConductorFresnel::Schlick { reflectance: Vec3::ONE };
+    scene.materials = vec![Material::new("brushed", MaterialKind::Conductor { alpha, fresnel })];
+    let ratio = f64::from((alpha + (1.0 - alpha) * strength * strength) / alpha);
+    let inside = 2.0 / std::f64::consts::PI * ratio.atan();
+    let texture = |[r, g, b]: [f32; 3]| {
+        let texel = [r, g, b, 1.0].map(half::f16::from_f32);
+        Some(TextureUse {
+            encoding: Encoding::Linear,
+            image_from_uv: [[1.0, 0.0, 0.0], [0.0, -1.0, 1.0]],
+            ..TextureUse::new(Arc::new(Texture {
+                name: "direction".into(),
+                width: 1,
+                height: 1,
+                texels: Texels::Halves(vec![texel]),
+            }))
+        })
+    };
+    let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
+    let straight = corners.map(|[x, z]: [f32; 2]| [x, -z]);
+    let turned = corners.map(|[x, z]: [f32; 2]| [-z, -x]);
+    let mirrored = corners.map(|[x, z]: [f32; 2]| [x, z]);
+    let eighth = std::f32::consts::FRAC_PI_4;
+    let flat = texture([0.5, 0.5, 1.0]);
+    for (name, uvs, rotation, direction, normal, expected) in [
+        ("toward v", straight, eighth, None, None, inside),
+        ("away from v", straight, -eighth, None, None, 1.0 - inside),
+        ("u along −z", turned, eighth, None, None, 1.0 - inside),
+        ("v along z", mirrored, eighth, None, None, 1.0 - inside),
+        ("texel up", straight, -eighth, texture([0.5, 1.0, 1.0]), None, inside),
+        ("texel askew", straight, 0.0, texture([0.25, 0.25, 1.0]), None, inside),
+        ("a flat normal map", straight, eighth, None, flat, inside),
+        ("no strength", straight, eighth, texture([1.0, 0.5, 0.0]), None, 0.5),
+    ] {
+        scene.geometry.uvs[0] = uvs.to_vec();
+        scene.materials[0].surface.anisotropy = Anisotropy { strength, rotation, direction };
+        scene.materials[0].surface.normal = normal;
+        let settings = Settings { sampler: Sampler::Brdf, ..Settings::default() };
+        let found = film_mean(&render(&scene, settings, 64)).x;
+        assert!((found - expected).abs() < 0.02, "{name}: {found}, expected {expected}");
+    }
 }
 
 #[test]

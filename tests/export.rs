@@ -617,6 +617,53 @@ fn images_of_radiance_keep_it_in_gltf() {
     assert!(read.abs_diff_eq(ours, 0.02 * ours.x), "{read}, expected {ours}");
 }
 
+/// Stretched highlights come back from every format, but for what Mitsuba and pbrt have no words for.
+#[test]
+fn stretched_highlights_are_written() {
+    let metal = "type = \"conductor\"\neta = [0.2, 0.9, 1.1]\nk = [3.9, 2.4, 2.2]\nalpha = 0.1\n\
+        anisotropy = 0.5\nanisotropy_rotate_deg = ";
+    let principled = "type = \"principled\"\nbase_color = [0.9, 0.6, 0.3]\nmetallic = 1\n\
+        roughness = 0.3\nanisotropy = 0.5\nanisotropy_rotate_deg = ";
+    for (text, turn, is_exact) in [
+        (metal, 0, [true; 3]),
+        (metal, 90, [true; 3]),
+        (metal, 30, [true, false, false]),
+        (principled, 0, [true; 3]),
+        (principled, 90, [true, false, true]),
+    ] {
+        let (folder, _, mitsuba_warnings, [ours, from_mitsuba]) =
+            both(&format!("{text}{turn}"), "");
+        let [gltf_path, pbrt_path] = ["out.gltf", "out.pbrt"].map(|name| folder.path().join(name));
+        let to_gltf = gltf::export(&ours, &gltf_path);
+        let to_pbrt = pbrt::export(&ours, &pbrt_path, SETTINGS);
+        let warnings = [&to_gltf.warnings, &mitsuba_warnings, &to_pbrt.warnings];
+        let named = warnings.map(|all| all.iter().any(|text| text.contains("they become round")));
+        assert_eq!(named, is_exact.map(|is_exact| !is_exact), "{text}{turn}");
+        to_gltf.write().unwrap();
+        to_pbrt.write().unwrap();
+        let [from_gltf, from_pbrt] = [gltf_path, pbrt_path].map(|path| Scene::load(&path).unwrap());
+        let material = &ours.materials[0];
+        for (read, is_exact) in [&from_gltf, &from_mitsuba, &from_pbrt].into_iter().zip(is_exact) {
+            // Index 0 may be a diffuse surface of another object.
+            let found = read.materials.iter().find(|own| own.name == material.name);
+            let found = found.unwrap_or(&read.materials[0]);
+            let [found_widths, expected] = [found, material].map(|of| {
+                let [along, across] = of.surface.anisotropy.widths(match &of.kind {
+                    MaterialKind::Conductor { alpha, .. } => *alpha,
+                    MaterialKind::Principled(own) => own.roughness * own.roughness,
+                    kind => panic!("{kind:?}"),
+                });
+                Vec2::new(along, across)
+            });
+            let mean = Vec2::splat(0.5 * expected.element_sum());
+            let expected = if is_exact { expected } else { mean };
+            assert!(found_widths.abs_diff_eq(expected, 1e-4), "{text}{turn}: {found_widths}");
+            let turned = found.surface.anisotropy.rotation - material.surface.anisotropy.rotation;
+            assert!(!is_exact || turned.abs() < 1e-6, "{text}{turn}: {turned}");
+        }
+    }
+}
+
 #[test]
 fn coats_go_to_gltf_alone() {
     let clay = "type = \"principled\"\nbase_color = [0.5, 0.2, 0.1]\nroughness = 0.5\n\

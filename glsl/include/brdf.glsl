@@ -217,9 +217,10 @@ Reflector reflector_from(Material material, vec3 outgoing_local) {
         material.reflectance *= outgoing_local.z < 0.0 ? material.eta : material.k;
         outgoing_local.z = abs(outgoing_local.z);
     }
+    GgxWidth width = material_width(material);
     Reflector reflector = Reflector(
-        material, outgoing_local, 0.0, 0.0, 0.0, ggx_stretched_length(outgoing_local, material.alpha),
-        ggx_cap_factor(outgoing_local, material.alpha), 0u);
+        material, outgoing_local, 0.0, 0.0, 0.0, ggx_stretched_length(outgoing_local, width),
+        ggx_cap_factor(outgoing_local, width), 0u);
     if (is_kind(material, MATERIAL_CONDUCTOR)) {
         reflector.share = 1.0;
     }
@@ -316,16 +317,16 @@ void cover(
     inout vec3 value, inout float pdf) {
     Material material = reflector.material;
     vec3 outgoing_local = reflector.outgoing_local;
-    float stretched = ggx_stretched_length(outgoing_local, material.coat_alpha);
-    float reflection = ggx_reflection(
-        half_vector, outgoing_local, stretched, incident_local, material.coat_alpha);
+    GgxWidth width = round_width(material.coat_alpha);
+    float stretched = ggx_stretched_length(outgoing_local, width);
+    float reflection =
+        ggx_reflection(half_vector, outgoing_local, stretched, incident_local, width);
     float fresnel = mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine_difference));
     float base = reflector.transmission
         * cosine_table(material.coat_table + COAT_TRANSMISSION_OFFSET, 1u, incident_local.z);
     value = base * value + vec3(material.coat_weight * fresnel * reflection);
     float coat_pdf = ggx_pdf(
-        half_vector, outgoing_local, stretched,
-        ggx_cap_factor(outgoing_local, material.coat_alpha), material.coat_alpha);
+        half_vector, outgoing_local, stretched, ggx_cap_factor(outgoing_local, width), width);
     pdf = mix(pdf, coat_pdf, reflector.coat_share);
 }
 
@@ -354,10 +355,10 @@ void brdf_evaluate_and_pdf(
     }
     vec3 half_vector = outgoing_local + incident_local;
     float cosine_difference = min(1.0, 0.5 * length(half_vector));
+    GgxWidth width = material_width(material);
     float reflection = ggx_reflection(
-        half_vector, outgoing_local, reflector.stretched, incident_local, material.alpha);
-    pdf = ggx_pdf(
-        half_vector, outgoing_local, reflector.stretched, reflector.cap_factor, material.alpha);
+        half_vector, outgoing_local, reflector.stretched, incident_local, width);
+    pdf = ggx_pdf(half_vector, outgoing_local, reflector.stretched, reflector.cap_factor, width);
     if (is_kind(material, MATERIAL_PLASTIC)) {
         float base = reflector.transmission
             * cosine_table(
@@ -404,13 +405,15 @@ vec3 brdf_sample(Reflector reflector, vec3 u) {
     float share = reflector.share;
     if (is_kind(material, MATERIAL_COATED)) {
         if (u.x < reflector.coat_share) {
-            float cap_factor = ggx_cap_factor(reflector.outgoing_local, material.coat_alpha);
-            return ggx_sample(reflector.outgoing_local, material.coat_alpha, cap_factor, u.yz);
+            GgxWidth width = round_width(material.coat_alpha);
+            float cap_factor = ggx_cap_factor(reflector.outgoing_local, width);
+            return ggx_sample(reflector.outgoing_local, width, cap_factor, u.yz);
         }
         share = mix(share, 1.0, reflector.coat_share);
     }
     if (u.x < share) {
-        return ggx_sample(reflector.outgoing_local, material.alpha, reflector.cap_factor, u.yz);
+        return ggx_sample(
+            reflector.outgoing_local, material_width(material), reflector.cap_factor, u.yz);
     }
     return sample_cosine_hemisphere(u.yz);
 }

@@ -11,8 +11,9 @@ LOADS(FirstVertex, load_first_vertex, first_vertex_texels)
 Reflector first_reflector(FirstVertex vertex, Frame frame) {
     Material material = load_material(vertex.material);
     if (IS_TEXTURED) {
-        material =
-            varied(material, Surface(vertex.reflectance, vertex.alpha, vertex.metallic));
+        material = varied(
+            material,
+            Surface(vertex.reflectance, vertex.alpha, vertex.metallic, vertex.anisotropy));
     }
     return reflector_from(material, to_local(frame, vertex.outgoing));
 }

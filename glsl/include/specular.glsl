@@ -41,7 +41,7 @@ Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back,
     float eta = relative_index(material, is_back);
     vec3 normal = vec3(0.0, 0.0, 1.0);
     if (material.alpha > 0.0) {
-        normal = ggx_normal_sample(outgoing_local, material.alpha, 1.0, u.yz);
+        normal = ggx_normal_sample(outgoing_local, round_width(material.alpha), 1.0, u.yz);
     }
     float cosine = dot(outgoing_local, normal);
     float fresnel = fresnel_interface(cosine, eta);
@@ -57,7 +57,8 @@ Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back,
     }
     if (material.alpha > 0.0) {
         result.weight *=
-            ggx_masking_ratio(outgoing_local, result.direction_local, material.alpha);
+            ggx_masking_ratio(
+                outgoing_local, result.direction_local, round_width(material.alpha));
     }
     // A normal may send light to the wrong side of the surface: no sample.
     if (cosine <= 0.0 || (result.direction_local.z < 0.0) != result.is_transmitted) {

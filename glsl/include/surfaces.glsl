@@ -13,6 +13,7 @@ const bool HAS_BACKS = (SURFACES & SURFACES_ONE_SIDED) != 0u;
 const bool HAS_INSTANCES = (SURFACES & SURFACES_INSTANCED) != 0u;
 const bool HAS_LAMP_CELLS = (SURFACES & SURFACES_LAMP_CELLS) != 0u;
 const bool IS_TEXTURED = (SURFACES & SURFACES_TEXTURED) != 0u;
+const bool IS_ANISOTROPIC = (SURFACES & SURFACES_ANISOTROPIC) != 0u;
 
 // Tests whether a kind of material is specular: no light is sampled at it.
 bool is_specular(uint kind) {
@@ -24,6 +25,7 @@ Material varied(Material material, Surface surface) {
     bool is_principled = material.kind == MATERIAL_PRINCIPLED || material.kind == MATERIAL_COATED;
     material.reflectance = surface.reflectance;
     material.alpha = surface.alpha;
+    material.anisotropy = surface.anisotropy;
     material.ior = is_principled ? surface.metallic : material.ior;
     return material;
 }

@@ -6,6 +6,7 @@
 // samples removes.
 
 #include "bvh.glsl"
+#include "ggx.glsl"
 #include "layout.glsl"
 
 layout(constant_id = CONSTANT_TEXTURE_PAGES) const uint TEXTURE_PAGES = 1u;
@@ -211,9 +212,10 @@ vec4 gradient_tangent(vec3 edge_1, vec3 edge_2, vec2 image_1, vec2 image_2, vec3
     return vec4(tangent, dot(cross(normal, tangent), along_v) > 0.0 ? -1.0 : 1.0);
 }
 
-// Unit tangent of a normal map at a point, at right angles to `normal`, and the sign of the
-// bitangent: the stored one, else from the coordinates of the triangle. `normal` is the unit shading
-// normal on the front, from where the triangle is counter-clockwise. 0 if there is no tangent.
+// Unit tangent of a texture at a point, at right angles to `normal`, and the sign of the bitangent: the
+// stored one, else from the coordinates of the triangle; for `NO_TEXTURE` from its first set, whose v points
+// up. `normal` is the unit shading normal on the front, from where the triangle is counter-clockwise. 0 if
+// there is no tangent.
 vec4 surface_tangent(
     uint use_index, uint triangle, uint instance, Attributes attributes, vec3 normal
 ) {
@@ -230,12 +232,15 @@ vec4 surface_tangent(
         return vec4(
             stored * inversesqrt(squared), turn * attributes.tangent.w < 0.0 ? -1.0 : 1.0);
     }
-    TextureUse used = load_texture_use(use_index);
     vec2 image[3];
     for (uint corner = 0u; corner < 3u; corner++) {
-        image[corner] = image_coordinates(
-            used, corner_uv(triangle, corner, ATTRIBUTE_FIRST_UVS),
-            corner_uv(triangle, corner, ATTRIBUTE_SECOND_UVS));
+        vec2 uv0 = corner_uv(triangle, corner, ATTRIBUTE_FIRST_UVS);
+        image[corner] = vec2(uv0.x, -uv0.y);
+        if (use_index != NO_TEXTURE) {
+            image[corner] = image_coordinates(
+                load_texture_use(use_index), uv0,
+                corner_uv(triangle, corner, ATTRIBUTE_SECOND_UVS));
+        }
     }
     vec3 a = triangle_corner(triangle, 0u, instance);
     vec3 b = triangle_corner(triangle, 1u, instance);
@@ -261,4 +266,35 @@ vec3 mapped_normal(
         + local.z * normal;
     float squared = dot(mapped, mapped);
     return squared > 1.0e-12 ? side * mapped * inversesqrt(squared) : shading_normal;
+}
+
+// Turns a vector by the angle of another from the x axis; by none for a vector of length 0.
+vec2 turned_by(vec2 vector, vec2 direction) {
+    float squared = dot(direction, direction);
+    vec2 turn = squared > 0.0 ? direction * inversesqrt(squared) : vec2(1.0, 0.0);
+    return vec2(vector.x * turn.x - vector.y * turn.y, vector.x * turn.y + vector.y * turn.x);
+}
+
+// Widths of a surface of width `alpha` that KHR_materials_anisotropy stretches along `axis`, strength times
+// a direction in tangent and bitangent; in the frame of the shading normal. Without a tangent the axes are
+// those of that frame.
+GgxWidth stretched_width(
+    float alpha, vec2 axis, vec4 tangent, vec3 tangent_normal, vec3 shading_normal
+) {
+    float strength = length(axis);
+    float along = mix(alpha, 1.0, strength * strength);
+    float mean = 0.5 * (along + alpha);
+    if (along <= alpha) {
+        return round_width(alpha);
+    }
+    vec2 direction = axis;
+    if (tangent.w != 0.0) {
+        vec3 bitangent = tangent.w * cross(tangent_normal, tangent.xyz);
+        direction = to_local(
+            frame_from_normal(shading_normal), axis.x * tangent.xyz + axis.y * bitangent).xy;
+    }
+    // Twice the angle of the direction, since both of its ends are alike.
+    vec2 twice = turned_by(direction, direction);
+    return GgxWidth(
+        mean, (along - alpha) / (along + alpha) * twice * inversesqrt(max(dot(twice, twice), 1.0e-30)));
 }

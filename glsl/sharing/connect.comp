@@ -31,7 +31,8 @@ vec3 offered_radiance(uint path, Offer offer, vec3 outgoing) {
     // The rest of the offer is fetched only here.
     Offer rest = load_offer(path);
     if (IS_TEXTURED) {
-        material = varied(material, Surface(rest.reflectance, offer.alpha, offer.metallic));
+        material = varied(
+            material, Surface(rest.reflectance, offer.alpha, offer.metallic, rest.anisotropy));
     }
     Frame frame = frame_from_normal(offer.shading_normal);
     Reflector reflector = reflector_from(material, to_local(frame, outgoing));

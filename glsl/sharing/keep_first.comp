@@ -18,7 +18,7 @@ void keep_first(uint path) {
     first_vertices[path] = FirstVertex(
         hit.position, hit.material, hit.geometric_normal, material.alpha, hit.shading_normal,
         material.ior, -load_ray(path).direction, paths[path].throughput, material.reflectance,
-        vec3(0.0));
+        material.anisotropy, 0.0);
 }
 
 RUN_PATHS(keep_first)

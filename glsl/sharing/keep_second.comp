@@ -40,9 +40,9 @@ void keep_second(uint path) {
     // The path has weighed its throughput by 1 / density: the ratio of the two densities.
     second_vertices[path] = SecondVertex(
         hit.position, hit.geometric_normal, hit.shading_normal, -direction, state.throughput,
-        state.radiance, material.reflectance, material.alpha, material.ior, hit.material, strongest,
-        pdf * (strongest / most), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0),
-        0.0, 0.0, u);
+        state.radiance, material.reflectance, material.alpha, material.ior, material.anisotropy,
+        hit.material, strongest, pdf * (strongest / most), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0),
+        vec3(0.0), vec3(0.0), 0.0, 0.0, u);
     // As strong as before, so that roulette ends the path as often.
     state.throughput = vec3(strongest);
     state.radiance = vec3(0.0);

@@ -32,7 +32,7 @@ void offer_path(uint path) {
         offers[path] = Offer(
             second.position, second.material, second.geometric_normal, second.density_ratio,
             second.shading_normal, second.alpha, light / second.scale, second.metallic,
-            second.incident, 0.0, second.reflectance, 0.0);
+            second.incident, second.reflectance, second.anisotropy);
     }
 }
 

@@ -36,13 +36,14 @@ fn grid(points: u32) -> impl Iterator<Item = Vec2> {
 /// to reflectance. Sums visible-normal samples at the midpoints of a grid: each weight is at most
 /// about 1, so 64² points are accurate to 1e-4.
 fn ggx_albedo(outgoing: Vec3, alpha: f32, points: u32, fresnel: impl Fn(f32) -> Vec3) -> Vec3 {
+    let width = GgxWidth::round(alpha);
     let mut sum = glam::DVec3::ZERO;
     for u in grid(points) {
-        let incident = ggx_sample(outgoing, alpha, u);
+        let incident = ggx_sample(outgoing, width, u);
         if incident.z > 0.0 {
             let half_vector = outgoing + incident;
-            let weight = ggx_reflection(half_vector, outgoing, incident, alpha)
-                / ggx_pdf(half_vector, outgoing, alpha)
+            let weight = ggx_reflection(half_vector, outgoing, incident, width)
+                / ggx_pdf(half_vector, outgoing, width)
                 * incident.z;
             sum += (weight * fresnel((0.5 * half_vector.length()).min(1.0))).as_dvec3();
         }

@@ -3,28 +3,69 @@
 
 use std::f32::consts::PI;
 
-use glam::{Vec2, Vec3, vec3};
+use glam::{Vec2, Vec3, vec2, vec3};
+
+use crate::shader::structs::Material;
 
 /// Smallest GGX width: single-precision directions cannot resolve a narrower lobe.
 pub(crate) const SMALLEST_ALPHA: f32 = 1e-3;
 
+/// Width of GGX by direction: a circle of radius `alpha`, stretched by the matrix I + M of M = (p, q; q, −p),
+/// (p, q) = `anisotropy`. The widths are alpha (1 ± |anisotropy|), the larger at half the angle of (p, q) from
+/// the x axis.
+#[derive(Clone, Copy, Debug)]
+pub struct GgxWidth {
+    /// Mean of the two widths α.
+    pub alpha: f32,
+    /// Entries (p, q), of a length below 1.
+    pub anisotropy: Vec2,
+}
+
+impl GgxWidth {
+    /// The same in all directions.
+    pub fn round(alpha: f32) -> Self {
+        Self { alpha, anisotropy: Vec2::ZERO }
+    }
+
+    /// That of a material's main lobe.
+    pub fn of(material: &Material) -> Self {
+        Self { alpha: material.alpha, anisotropy: material.anisotropy.into() }
+    }
+
+    /// M times a vector.
+    fn turned(self, tangential: Vec2) -> Vec2 {
+        let Vec2 { x: p, y: q } = self.anisotropy;
+        vec2(self.anisotropy.dot(tangential), q * tangential.x - p * tangential.y)
+    }
+
+    /// Stretches a direction as the surface of width 1 is.
+    fn stretched(self, direction: Vec3) -> Vec3 {
+        let tangential = direction.truncate();
+        (self.alpha * (tangential + self.turned(tangential))).extend(direction.z)
+    }
+}
+
 /// Density of GGX normals, per steradian, for a half vector of any length. \[Walter et al. 2007\]
-/// Eq. 33, without the cancellation in 1 − cos²θ, which matters for α below 0.01.
-pub fn ggx_normal_density(half_vector: Vec3, alpha: f32) -> f32 {
-    let tangential = half_vector.truncate().dot(half_vector.truncate());
+/// Eq. 33, without the cancellation in 1 − cos²θ, which matters for α below 0.01; \[Heitz 2014\] Eq. 85.
+pub fn ggx_normal_density(half_vector: Vec3, width: GgxWidth) -> f32 {
+    let tangential = half_vector.truncate();
     let normal = half_vector.z * half_vector.z;
-    let ratio = (tangential + normal) / (tangential + alpha * alpha * normal);
-    alpha * alpha * ratio * ratio / PI
+    let squared = tangential.dot(tangential) + normal;
+    // Determinant of I + M, whose inverse is (I − M) over it.
+    let area = 1.0 - width.anisotropy.dot(width.anisotropy);
+    let narrowed = (tangential - width.turned(tangential)) / area;
+    let ratio = squared / (narrowed.dot(narrowed) + width.alpha * width.alpha * normal);
+    width.alpha * width.alpha * ratio * ratio / (PI * area)
 }
 
 /// Length of the direction after stretching the surface to α = 1: √(cos²θ + α² sin²θ).
-pub fn ggx_stretched_length(direction: Vec3, alpha: f32) -> f32 {
-    (alpha * direction.truncate()).extend(direction.z).length()
+pub fn ggx_stretched_length(direction: Vec3, width: GgxWidth) -> f32 {
+    width.stretched(direction).length()
 }
 
 /// Lower end of the spherical cap of bounded sampling, as a factor. \[Eto & Tokuyoshi 2023\] Eq. 5.
-fn ggx_cap_factor(outgoing_local: Vec3, alpha: f32) -> f32 {
-    let bounded_alpha = alpha.min(1.0);
+fn ggx_cap_factor(outgoing_local: Vec3, width: GgxWidth) -> f32 {
+    let bounded_alpha = (width.alpha * (1.0 - width.anisotropy.length())).min(1.0);
     let alpha_squared = bounded_alpha * bounded_alpha;
     let s = 1.0 + outgoing_local.truncate().length();
     let s_squared = s * s;
@@ -38,38 +79,38 @@ pub(crate) fn ggx_reflection(
     half_vector: Vec3,
     outgoing_local: Vec3,
     incident_local: Vec3,
-    alpha: f32,
+    width: GgxWidth,
 ) -> f32 {
-    let masking = incident_local.z * ggx_stretched_length(outgoing_local, alpha)
-        + outgoing_local.z * ggx_stretched_length(incident_local, alpha);
-    0.5 * ggx_normal_density(half_vector, alpha) / masking
+    let masking = incident_local.z * ggx_stretched_length(outgoing_local, width)
+        + outgoing_local.z * ggx_stretched_length(incident_local, width);
+    0.5 * ggx_normal_density(half_vector, width) / masking
 }
 
 /// Density of [`ggx_sample`]. \[Eto & Tokuyoshi 2023\] Eq. 8 with the Jacobian of the reflection.
-pub fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
-    let cap = ggx_cap_factor(outgoing_local, alpha) * outgoing_local.z
-        + ggx_stretched_length(outgoing_local, alpha);
-    0.5 * ggx_normal_density(half_vector, alpha) / cap
+pub fn ggx_pdf(half_vector: Vec3, outgoing_local: Vec3, width: GgxWidth) -> f32 {
+    let cap = ggx_cap_factor(outgoing_local, width) * outgoing_local.z
+        + ggx_stretched_length(outgoing_local, width);
+    0.5 * ggx_normal_density(half_vector, width) / cap
 }
 
 /// Samples a normal by its projection toward the outgoing direction, on the spherical cap above
 /// −`cap_factor`; a factor of 1 gives all visible normals. \[Dupuy & Benyoub 2023\].
-pub fn ggx_normal_sample(outgoing_local: Vec3, alpha: f32, cap_factor: f32, u: Vec2) -> Vec3 {
-    let stretched = (alpha * outgoing_local.truncate()).extend(outgoing_local.z).normalize();
+pub fn ggx_normal_sample(outgoing_local: Vec3, width: GgxWidth, cap_factor: f32, u: Vec2) -> Vec3 {
+    let stretched = width.stretched(outgoing_local).normalize();
     let cap = cap_factor * stretched.z;
     // 1 − z rather than z keeps the root below accurate near the pole.
     let below_pole = u.x * (1.0 + cap);
     let sine = (below_pole * (2.0 - below_pole)).max(0.0).sqrt();
     let azimuth = 2.0 * PI * u.y;
     let normal = stretched + vec3(sine * azimuth.cos(), sine * azimuth.sin(), 1.0 - below_pole);
-    (alpha * normal.truncate()).extend(normal.z.max(1e-7)).normalize()
+    width.stretched(normal.truncate().extend(normal.z.max(1e-7))).normalize()
 }
 
 /// Samples an incident direction by the visible normals of GGX, on the spherical cap that omits
 /// most reflections below the surface. Those that remain have z ≤ 0: no sample. \[Dupuy & Benyoub
 /// 2023\], \[Eto & Tokuyoshi 2023\].
-pub fn ggx_sample(outgoing_local: Vec3, alpha: f32, u: Vec2) -> Vec3 {
-    let cap_factor = ggx_cap_factor(outgoing_local, alpha);
-    let normal = ggx_normal_sample(outgoing_local, alpha, cap_factor, u);
+pub fn ggx_sample(outgoing_local: Vec3, width: GgxWidth, u: Vec2) -> Vec3 {
+    let cap_factor = ggx_cap_factor(outgoing_local, width);
+    let normal = ggx_normal_sample(outgoing_local, width, cap_factor, u);
     2.0 * outgoing_local.dot(normal) * normal - outgoing_local
 }

@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::{
     brdf::{
@@ -41,6 +41,14 @@ impl MaterialTables {
             |tables: &mut Self| *ggx_offset.get_or_insert_with(|| tables.append(ggx_words()));
         for material in materials {
             let mut converted = structs::Material::default();
+            let anisotropy = &material.surface.anisotropy;
+            let widths = |converted: &mut structs::Material, alpha: f32| {
+                let [along, across] = anisotropy.widths(alpha.max(SMALLEST_ALPHA));
+                converted.alpha = 0.5 * (along + across);
+                let stretch = (along - across) / (along + across);
+                let twice = Vec2::from_angle(2.0 * anisotropy.rotation);
+                converted.anisotropy = (stretch * twice).to_array();
+            };
             match &material.kind {
                 MaterialKind::Diffuse { reflectance } => {
                     converted.kind = MATERIAL_DIFFUSE;
@@ -70,7 +78,7 @@ impl MaterialTables {
                 }
                 MaterialKind::Conductor { alpha, fresnel } => {
                     converted.kind = MATERIAL_CONDUCTOR;
-                    converted.alpha = alpha.max(SMALLEST_ALPHA);
+                    widths(&mut converted, *alpha);
                     match fresnel {
                         ConductorFresnel::Schlick { reflectance } => {
                             converted.reflectance = reflectance.to_array();
@@ -89,7 +97,7 @@ impl MaterialTables {
                     let ratio = (own.ior - 1.0) / (own.ior + 1.0);
                     converted.kind = MATERIAL_PRINCIPLED;
                     converted.reflectance = own.base_color.to_array();
-                    converted.alpha = (own.roughness * own.roughness).max(SMALLEST_ALPHA);
+                    widths(&mut converted, own.roughness * own.roughness);
                     converted.ior = own.metallic;
                     converted.eta = (own.specular_color * ratio * ratio)
                         .min(Vec3::ONE)

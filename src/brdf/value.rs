@@ -72,7 +72,8 @@ pub fn brdf_evaluate(
     }
     let half_vector = outgoing_local + incident_local;
     let cosine_difference = (0.5 * half_vector.length()).min(1.0);
-    let reflection = ggx_reflection(half_vector, outgoing_local, incident_local, material.alpha);
+    let reflection =
+        ggx_reflection(half_vector, outgoing_local, incident_local, GgxWidth::of(material));
     // Light that a coat lets in and out.
     let through = |table: u32| {
         let at = |cosine| cosine_table(brdf_table, table + COAT_TRANSMISSION_OFFSET, 1, cosine);
@@ -86,8 +87,8 @@ pub fn brdf_evaluate(
         }
         MATERIAL_PRINCIPLED => principled_value(material, reflection, cosine_difference),
         MATERIAL_COATED => {
-            let alpha = material.coat_alpha;
-            let coat = ggx_reflection(half_vector, outgoing_local, incident_local, alpha);
+            let width = GgxWidth::round(material.coat_alpha);
+            let coat = ggx_reflection(half_vector, outgoing_local, incident_local, width);
             let fresnel = mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine_difference));
             let base = principled_value(material, reflection, cosine_difference);
             through(material.coat_table) * base + Vec3::splat(material.coat_weight * fresnel * coat)

@@ -4,8 +4,9 @@ use super::texture_buffers::TextureAccess;
 use crate::{
     scene::material::{Material, MaterialKind},
     shader::constants::{
-        CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, SPECULAR_KINDS, SURFACES_EMITTING,
-        SURFACES_ONE_SIDED, SURFACES_PASSING, SURFACES_SPECULAR, SURFACES_TEXTURED,
+        CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, SPECULAR_KINDS, SURFACES_ANISOTROPIC,
+        SURFACES_EMITTING, SURFACES_ONE_SIDED, SURFACES_PASSING, SURFACES_SPECULAR,
+        SURFACES_TEXTURED,
     },
 };
 
@@ -56,7 +57,9 @@ fn features_of(material: &Material) -> u32 {
     let is_pane = matches!(material.kind, MaterialKind::ThinDielectric { .. });
     let is_opaque =
         surface.opacity.factor >= 1.0 && surface.opacity.texture.is_none() && !surface.vertex_color;
+    let is_anisotropic = surface.anisotropy.strength > 0.0;
     let is_textured = surface.vertex_color
+        || is_anisotropic
         || [&surface.color, &surface.roughness, &surface.metallic, &surface.normal]
             .iter()
             .any(|texture| texture.is_some());
@@ -65,6 +68,7 @@ fn features_of(material: &Material) -> u32 {
         (SURFACES_PASSING, is_pane || !is_opaque),
         (SURFACES_ONE_SIDED, !surface.two_sided),
         (SURFACES_TEXTURED, is_textured),
+        (SURFACES_ANISOTROPIC, is_anisotropic),
         (SURFACES_EMITTING, surface.emission.is_some()),
     ]
     .into_iter()

@@ -148,6 +148,8 @@ constants! {
     SURFACES_INSTANCED = 32;
     /// Lamps are chosen by place.
     SURFACES_LAMP_CELLS = 64;
+    /// Some widths of GGX differ by direction.
+    SURFACES_ANISOTROPIC = 128;
 
     // Dimensions of random numbers that the host draws too.
     /// First dimension of the first vertex of a path.

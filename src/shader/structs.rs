@@ -160,6 +160,8 @@ structs! {
         alpha: float,
         /// Share of metal there, of a principled material.
         metallic: float,
+        /// [`Material::anisotropy`] there.
+        anisotropy: vec2,
     }
 
     /// Layers of surfaces at the sample of a path.
@@ -262,8 +264,10 @@ structs! {
         throughput: vec3,
         /// [`Surface::reflectance`], in scenes with textures.
         reflectance: vec3,
+        /// [`Surface::anisotropy`], in scenes with textures.
+        anisotropy: vec2,
         /// Zero; pads the last of six texels of four words.
-        reserved: vec3,
+        reserved: float,
     }
 
     /// Second vertex of a path, offered to the other pixels of its cohort.
@@ -286,6 +290,8 @@ structs! {
         alpha: float,
         /// [`Surface::metallic`], in scenes with textures.
         metallic: float,
+        /// [`Surface::anisotropy`], in scenes with textures.
+        anisotropy: vec2,
         /// Material index.
         material: uint,
         /// Throughput with which the path goes on instead; 0 if the vertex is not shared.
@@ -333,12 +339,10 @@ structs! {
         metallic: float,
         /// Unit vector to where that light comes from.
         incident: vec3,
-        /// Zero; pads a texel of four words.
-        reserved: float,
         /// [`Surface::reflectance`], in scenes with textures.
         reflectance: vec3,
-        /// Zero; pads the last of six texels of four words.
-        padding: float,
+        /// [`Surface::anisotropy`], in scenes with textures.
+        anisotropy: vec2,
     }
 
     /// Connection of the first vertex of a path with the second vertex of another.
@@ -410,6 +414,10 @@ structs! {
         coat_alpha: float,
         /// First word of the coat's own table in the BRDF table buffer.
         coat_table: uint,
+        /// Stretch of the widths of GGX, as `GgxWidth` has it; then `alpha` is their mean.
+        anisotropy: vec2,
+        /// Zero; pads the last of five texels of four words.
+        reserved: vec2,
     }
 
     /// Texture as a property of a material reads it: value = scale · texel + bias.
@@ -447,6 +455,8 @@ structs! {
         opacity: uint,
         /// Factor of the emitted radiance.
         emission: uint,
+        /// Direction and factor of `anisotropy`.
+        anisotropy_direction: uint,
         /// Factor of the tangential components of `normal`.
         normal_scale: float,
         /// Opacity without its texture.
@@ -461,8 +471,10 @@ structs! {
         emission_density: float,
         /// Group of the emitted light.
         light_group: uint,
-        /// Zero; pads the last of four texels of four words.
-        reserved: float,
+        /// Strength of the anisotropy along tangent and bitangent; 0 for a round width.
+        anisotropy: vec2,
+        /// Zero; pads the last of five texels of four words.
+        reserved: vec2,
     }
 
     /// Push constants of the passes over a wave of paths. Path `i` belongs to sample `first_sample + i

@@ -3,8 +3,10 @@
 pub mod lookup;
 pub mod textures;
 
+use glam::Vec2;
+
 use crate::{
-    scene::material::{Material, Surface},
+    scene::material::{Anisotropy, Material, Surface},
     shader::{
         constants::{
             ATTRIBUTE_COLOR, ATTRIBUTE_FIRST_UVS, ATTRIBUTE_SECOND_UVS, ATTRIBUTE_TANGENT,
@@ -46,6 +48,7 @@ impl SurfaceTables {
             self.textures.add(used)
         };
         let emission = surface.emission.as_ref();
+        let Anisotropy { strength, rotation, .. } = surface.anisotropy;
         let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
         let converted = MaterialSurface {
             color: texture(surface.color.as_ref()),
@@ -53,6 +56,7 @@ impl SurfaceTables {
             metallic: texture(surface.metallic.as_ref()),
             normal: texture(surface.normal.as_ref()),
             opacity: texture(surface.opacity.texture.as_ref()),
+            anisotropy_direction: texture(surface.anisotropy.direction.as_ref()),
             emission: texture(emission.and_then(|emission| emission.texture.as_ref())),
             normal_scale: surface.normal_scale,
             opacity_factor: surface.opacity.factor,
@@ -66,9 +70,11 @@ impl SurfaceTables {
                 ),
             emission_density: 0.0,
             light_group: 0,
-            reserved: 0.0,
+            anisotropy: (strength * Vec2::from_angle(rotation)).to_array(),
+            reserved: [0.0; 2],
         };
-        self.attributes |= flag(surface.normal.is_some(), ATTRIBUTE_TANGENT)
+        self.attributes |= flag(surface.tangent_uv_set().is_some(), ATTRIBUTE_TANGENT)
+            | flag(strength > 0.0, ATTRIBUTE_FIRST_UVS)
             | flag(surface.vertex_color, ATTRIBUTE_COLOR);
         self.surfaces.push(converted);
     }

@@ -11,7 +11,7 @@ use fenestra::{
     brdf::{self, MaterialTables},
     math::random::hash_4d,
     scene::{
-        material::{ConductorFresnel, Material, MaterialKind, Principled},
+        material::{Anisotropy, ConductorFresnel, Material, MaterialKind, Principled},
         measured::MeasuredTable,
     },
     shader::structs,
@@ -52,6 +52,12 @@ fn coated(
         coat_roughness,
         ..Principled::default()
     })
+}
+
+/// A case whose highlights are stretched: strength, and angle from the tangent in radians.
+fn brushed(mut case: Case, strength: f32, rotation: f32) -> Case {
+    case.material.surface.anisotropy = Anisotropy { strength, rotation, direction: None };
+    case
 }
 
 /// Gold near 600, 550 and 450 nm.
@@ -125,6 +131,21 @@ pub fn cases() -> &'static [Case] {
             case("coated metal", 0.1, coated(vec3(1.0, 0.7, 0.3), [1.0, 1.0, 0.5, 0.7, 0.2])),
             case("rough coat", 0.04, coated(vec3(0.8, 0.4, 0.2), [0.4, 1.0, 0.2, 1.0, 0.6])),
             case("coated black", 0.06, coated(Vec3::ZERO, [0.0, 0.0, 1.0, 1.0, 0.25])),
+            brushed(
+                case("brushed gold", 0.1, MaterialKind::Conductor { alpha: 0.1, fresnel: GOLD }),
+                0.5,
+                0.6,
+            ),
+            brushed(
+                case("brushed half metal", 0.09, principled(vec3(0.9, 0.6, 0.3), 0.5, 0.3)),
+                0.6,
+                -1.1,
+            ),
+            brushed(
+                case("brushed lacquer", 0.07, coated(Vec3::ONE, [1.0, 1.0, 0.3, 0.5, 0.25])),
+                0.4,
+                2.0,
+            ),
             case(
                 "sheet",
                 1.0,

@@ -120,7 +120,7 @@ pub fn brdf_evaluate_and_pdf(
     let offset = material.table_offset;
     let cosine_pdf = incident_local.z / PI;
     let half_vector = outgoing_local + incident_local;
-    let specular_pdf = || ggx_pdf(half_vector, outgoing_local, material.alpha);
+    let specular_pdf = || ggx_pdf(half_vector, outgoing_local, GgxWidth::of(material));
     let pdf = match material.kind {
         MATERIAL_DIFFUSE | MATERIAL_DIFFUSE_TRANSMISSION => cosine_pdf,
         MATERIAL_MEASURED => {
@@ -135,7 +135,7 @@ pub fn brdf_evaluate_and_pdf(
         _ => 0.0,
     };
     if material.kind == MATERIAL_COATED {
-        let coat_pdf = ggx_pdf(half_vector, outgoing_local, material.coat_alpha);
+        let coat_pdf = ggx_pdf(half_vector, outgoing_local, GgxWidth::round(material.coat_alpha));
         return (value, mix(pdf, coat_pdf, coat_share(brdf_table, material, outgoing_local.z)));
     }
     (value, pdf)
@@ -177,12 +177,16 @@ pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
     if material.kind == MATERIAL_COATED {
         let coat_share = coat_share(brdf_table, material, outgoing_local.z);
         if u.x < coat_share {
-            return ggx_sample(outgoing_local, material.coat_alpha, vec2(u.y, u.z));
+            return ggx_sample(
+                outgoing_local,
+                GgxWidth::round(material.coat_alpha),
+                vec2(u.y, u.z),
+            );
         }
         specular_share = mix(specular_share, 1.0, coat_share);
     }
     if u.x < specular_share {
-        return ggx_sample(outgoing_local, material.alpha, vec2(u.y, u.z));
+        return ggx_sample(outgoing_local, GgxWidth::of(material), vec2(u.y, u.z));
     }
     sample_cosine_hemisphere(vec2(u.y, u.z))
 }

@@ -21,17 +21,19 @@ use glam::{Vec3, vec2, vec3};
 /// Density of all visible normals, per steradian, over the cosine of outgoing direction and normal:
 /// G₁·D/cosθ_o. \[Heitz 2014\] Eq. 21.
 fn ggx_visible_density(normal: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
-    2.0 * ggx_normal_density(normal, alpha)
-        / (outgoing_local.z + ggx_stretched_length(outgoing_local, alpha))
+    let width = GgxWidth::round(alpha);
+    2.0 * ggx_normal_density(normal, width)
+        / (outgoing_local.z + ggx_stretched_length(outgoing_local, width))
 }
 
 /// G₂ of both directions over G₁ of the outgoing one; height-correlated on one side, and the same
 /// expression where the other direction is below the surface. 0…1.
 fn ggx_masking_ratio(outgoing_local: Vec3, incident_local: Vec3, alpha: f32) -> f32 {
     let cosine = incident_local.z.abs();
-    let stretched = ggx_stretched_length(outgoing_local, alpha);
+    let width = GgxWidth::round(alpha);
+    let stretched = ggx_stretched_length(outgoing_local, width);
     (outgoing_local.z + stretched) * cosine
-        / (stretched * cosine + outgoing_local.z * ggx_stretched_length(incident_local, alpha))
+        / (stretched * cosine + outgoing_local.z * ggx_stretched_length(incident_local, width))
 }
 
 /// Continuation of a path; a weight of 0 ends it.
@@ -73,7 +75,8 @@ fn dielectric_scatter(
     let eta = relative_index(material, is_back);
     let mut normal = Vec3::Z;
     if material.alpha > 0.0 {
-        normal = ggx_normal_sample(outgoing_local, material.alpha, 1.0, vec2(u.y, u.z));
+        normal =
+            ggx_normal_sample(outgoing_local, GgxWidth::round(material.alpha), 1.0, vec2(u.y, u.z));
     }
     let cosine = outgoing_local.dot(normal);
     let fresnel = fresnel_interface(cosine, eta);

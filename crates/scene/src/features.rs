@@ -53,7 +53,7 @@ features! {
     GLTF_CLEARCOAT_TEXTURE "textures of `KHR_materials_clearcoat`" "their means; normals as below the coat";
     GLTF_SHEEN "`KHR_materials_sheen`" "without the bright rim of cloth";
     GLTF_IRIDESCENCE "`KHR_materials_iridescence`" "reflections without the colours of thin films";
-    GLTF_ANISOTROPY "`KHR_materials_anisotropy`" "highlights are round";
+    GLTF_ANISOTROPY "anisotropy of glass or a sheet" "left out";
     GLTF_DISPERSION "`KHR_materials_dispersion`" "glass does not part colours";
     GLTF_VARIANTS "`KHR_materials_variants`" "without `--variant NAME`";
     GLTF_BASISU "`KHR_texture_basisu`" "the other image of the texture is used; refused if there is none";
@@ -128,7 +128,8 @@ features! {
         "one lobe of the mean roughness; images on other coordinates than the first count by their means";
     PBRT_MIX "the lesser part of `mix` with glass or a sheet" "the other one is the whole surface";
     PBRT_COAT_ALBEDO "`albedo` of coats" "coats are clear";
-    PBRT_ANISOTROPY "`uroughness` other than `vroughness`" "their mean α, or the texture";
+    PBRT_ANISOTROPY "`uroughness` other than `vroughness`, of plastic and glass or textures"
+        "their mean α, or the texture";
     PBRT_TEXTURE "other textures, by name" "`fbm`, `marble`, `dots`, `ptex` and others are 0.5";
     PBRT_TEXTURE_MIX "`scale` and `mix` of images on other coordinates than the first" "their means count";
     PBRT_TEXTURE_WRAP "`wrap` other than `repeat` and `clamp`" "as `clamp`";
@@ -168,7 +169,8 @@ features! {
         "the other one is the whole surface";
     MI_BUMP_MAP "`bumpmap` of vertex colours, or beside a `normalmap`" "left out";
     MI_BECKMANN "distribution `beckmann`" "`ggx` of the same α";
-    MI_ANISOTROPIC "`alpha_u` and `alpha_v` that differ" "their mean, or `alpha_u`";
+    MI_ANISOTROPIC "`alpha_u` and `alpha_v` of plastic and glass, or images that differ"
+        "their mean, or the image of `alpha_u`";
     MI_ALPHA_TEXTURE "`alpha` of vertices" "0.1";
     MI_SPECULAR "`specular_reflectance` of plastic" "white";
     MI_SPECULAR_TEXTURE "textures of `specular_reflectance` and `specular_transmittance` of dielectrics"
@@ -188,12 +190,13 @@ features! {
 }
 
 /// Extensions of glTF that are read.
-pub const GLTF_EXTENSIONS: [&str; 17] = [
+pub const GLTF_EXTENSIONS: [&str; 18] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",

@@ -9,7 +9,7 @@ use crate::{
     files::hexadecimal,
     instance::Instance,
     lamp::LampKind,
-    material::{MaterialKind, Surface},
+    material::{Anisotropy, MaterialKind, Surface},
     texture::{Texels, TextureUse},
 };
 
@@ -58,6 +58,8 @@ fn hashed(feed: impl FnOnce(&mut Hasher)) -> String {
 const PORTAL_TAG: u32 = 3;
 /// Follows that of portals.
 const LIGHT_GROUP_TAG: u32 = 4;
+/// Follows that of light groups.
+const ANISOTROPY_TAG: u32 = 5;
 
 struct Hasher(Sha256);
 
@@ -158,6 +160,12 @@ impl Hasher {
         if let Some(emission) = &surface.emission {
             self.array(&[emission.radiance]);
             self.array(&[u32::from(emission.two_sided)]);
+        }
+        let Anisotropy { strength, rotation, direction } = &surface.anisotropy;
+        if *strength > 0.0 {
+            self.array(&[ANISOTROPY_TAG]);
+            self.array(&[*strength, *rotation]);
+            self.texture(direction.as_ref());
         }
         self.light_group(surface.light_group.as_deref());
     }

@@ -1,6 +1,6 @@
 //! Validated materials of a scene.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{f32::consts::FRAC_PI_2, path::PathBuf, sync::Arc};
 
 use glam::Vec3;
 
@@ -32,7 +32,7 @@ impl Material {
         let color = mean(&self.surface.color);
         let rough = luminance(mean(&self.surface.roughness));
         let metal = luminance(mean(&self.surface.metallic));
-        match self.kind.scaled(color, rough, metal) {
+        match self.surface.anisotropy.rounded(self.kind.scaled(color, rough, metal)) {
             // Both sides have the one lobe that is to be fitted.
             MaterialKind::DiffuseTransmission { reflectance, transmittance } => {
                 MaterialKind::Diffuse { reflectance: (reflectance + transmittance).min(Vec3::ONE) }
@@ -53,6 +53,8 @@ pub struct Surface {
     pub roughness: Option<TextureUse>,
     /// Factor of the metallic share of a principled material.
     pub metallic: Option<TextureUse>,
+    /// Stretch of the highlights of a conductor or a principled material.
+    pub anisotropy: Anisotropy,
     /// Normals in the tangent frame, n = 2 · texel − 1, linear.
     pub normal: Option<TextureUse>,
     /// Factor of the tangential components of `normal`.
@@ -74,6 +76,7 @@ impl Default for Surface {
             vertex_color: false,
             roughness: None,
             metallic: None,
+            anisotropy: Anisotropy::default(),
             normal: None,
             normal_scale: 1.0,
             opacity: Opacity::default(),
@@ -94,7 +97,60 @@ impl Surface {
 
     /// Every use of a texture.
     pub fn textures(&self) -> impl Iterator<Item = &TextureUse> {
-        self.uses().into_iter().flatten()
+        self.uses().into_iter().flatten().chain(&self.anisotropy.direction)
+    }
+
+    /// Set of texture coordinates along whose u the tangents lie; none if nothing reads them.
+    pub fn tangent_uv_set(&self) -> Option<u32> {
+        let Anisotropy { strength, direction, .. } = &self.anisotropy;
+        let stretched = (*strength > 0.0).then(|| direction.as_ref().map_or(0, |used| used.uv_set));
+        self.normal.as_ref().map(|normal| normal.uv_set).or(stretched)
+    }
+
+    /// True if a mesh needs texture coordinates.
+    pub(crate) fn reads_uvs(&self) -> bool {
+        self.tangent_uv_set().is_some() || self.textures().next().is_some()
+    }
+}
+
+/// Widths of GGX that differ by direction, as `KHR_materials_anisotropy` has them: the material's is the
+/// smaller.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Anisotropy {
+    /// Strength s, 0…1: the larger width is α + (1 − α) s².
+    pub strength: f32,
+    /// Angle from the tangent, toward the bitangent, to where that width lies, radians.
+    pub rotation: f32,
+    /// Red and green, 0…1, are another tangent, −1…1; blue is a factor of the strength.
+    pub direction: Option<TextureUse>,
+}
+
+impl Anisotropy {
+    /// Larger and smaller width of a material of width `alpha`.
+    pub fn widths(&self, alpha: f32) -> [f32; 2] {
+        [alpha + (1.0 - alpha) * self.strength * self.strength, alpha]
+    }
+
+    /// Width of a material, and its anisotropy, from the widths along tangent and bitangent.
+    pub(crate) fn of_widths([along_u, along_v]: [f32; 2]) -> (f32, Self) {
+        let (least, most) = (along_u.min(along_v), along_u.max(along_v));
+        let strength = if most > least { ((most - least) / (1.0 - least)).sqrt() } else { 0.0 };
+        let rotation = if along_v > along_u { FRAC_PI_2 } else { 0.0 };
+        (least, Self { strength, rotation, direction: None })
+    }
+
+    /// The material with the mean of its widths for all directions.
+    pub(crate) fn rounded(&self, mut kind: MaterialKind) -> MaterialKind {
+        let mean = |alpha| 0.5 * self.widths(alpha).iter().sum::<f32>();
+        match &mut kind {
+            _ if self.strength == 0.0 => {}
+            MaterialKind::Conductor { alpha, .. } => *alpha = mean(*alpha),
+            MaterialKind::Principled(own) => {
+                own.roughness = mean(own.roughness * own.roughness).sqrt();
+            }
+            _ => {}
+        }
+        kind
     }
 }
 

@@ -7,7 +7,7 @@ use std::f32::consts::FRAC_PI_2;
 use fenestra_scene::{
     Scene,
     lamp::{LampKind, SpotFalloff},
-    material::{Material, MaterialKind, Principled},
+    material::{Anisotropy, Material, MaterialKind, Principled},
     mesh::Mesh,
     picture::Image,
     texture::{Channels, Encoding, Interpolation, TextureUse, Wrap},
@@ -66,7 +66,9 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
             "KHR_materials_ior": {"ior": 1.4}, "KHR_materials_specular":
                 {"specularFactor": 0.5, "specularColorFactor": [2, 1, 1]},
             "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25,
-                "clearcoatNormalTexture": {"index": 1, "scale": 0.5}}}}"#;
+                "clearcoatNormalTexture": {"index": 1, "scale": 0.5}},
+            "KHR_materials_anisotropy": {"anisotropyStrength": 0.75, "anisotropyRotation": 0.5,
+                "anisotropyTexture": {"index": 1}}}}"#;
     let (found, warnings) = gltf_material(&folder, material, &rest);
     assert_eq!(warnings, [""; 0]);
     let MaterialKind::Principled(Principled {
@@ -85,6 +87,10 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
     assert_eq!((base_color, metallic), (Vec3::new(0.8, 0.6, 0.4), 0.25));
     assert_eq!((roughness, ior, specular), (0.5, 1.4, 0.5));
     assert_eq!((coat_weight, coat_roughness), (0.5, 0.25));
+    let Anisotropy { strength, rotation, direction } = &found.surface.anisotropy;
+    let direction = direction.as_ref().unwrap();
+    assert_eq!((*strength, *rotation), (0.75, 0.5));
+    assert_eq!((direction.channels, direction.encoding), (Channels::Color, Encoding::Linear));
     // Images of a coat count by their means, and it has no normals of its own.
     let images = r#""clearcoatTexture": {"index": 0}, "clearcoatRoughnessTexture": {"index": 0}"#;
     let normal = r#""clearcoatNormalTexture": {"index": 1, "scale": 0.5}"#;
@@ -1005,6 +1011,15 @@ fn mtl_materials_become_surfaces() {
         panic!()
     };
     assert_eq!((metallic, roughness), (1.0, 0.3));
+    // The aspect is ½, a quarter of a turn further.
+    let brushed = mtl_material(&folder, "Kd 0.5\nPr 0.4\naniso 0.8333333\nanisor 0.25").0;
+    let MaterialKind::Principled(Principled { roughness, .. }) = brushed.kind else { panic!() };
+    let [along, across] = brushed.surface.anisotropy.widths(roughness * roughness);
+    assert!((along - 0.32).abs() < 1e-5 && (across - 0.08).abs() < 1e-5, "{along} {across}");
+    assert_eq!(brushed.surface.anisotropy.rotation, FRAC_PI_2);
+    // Fits have one lobe, of the mean width.
+    let MaterialKind::Principled(mean) = brushed.mean_kind() else { panic!() };
+    assert!((mean.roughness * mean.roughness - 0.2).abs() < 1e-5, "{}", mean.roughness);
     let coated = kind("Kd 0.5\nPc 0.5\nPcr 0.25");
     let MaterialKind::Principled(Principled { coat_weight, coat_roughness, .. }) = coated else {
         panic!("{coated:?}")

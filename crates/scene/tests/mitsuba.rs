@@ -2,14 +2,18 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use std::{f32::consts::PI, io::Write, path::Path};
+use std::{
+    f32::consts::{FRAC_PI_2, PI},
+    io::Write,
+    path::Path,
+};
 
 use fenestra_scene::{
     Asked, Filter, Scene,
     export::{Settings, mitsuba::export},
     lamp::{LampKind, SpotFalloff},
     load::LoadOptions,
-    material::{ConductorFresnel, Material, MaterialKind, Principled, Surface},
+    material::{Anisotropy, ConductorFresnel, Material, MaterialKind, Principled, Surface},
     texture::{Encoding, Interpolation, Wrap},
 };
 use glam::{Vec2, Vec3, Vec4};
@@ -297,7 +301,9 @@ fn models_become_materials() {
     else {
         panic!()
     };
-    assert!((alpha - 0.2).abs() < 1e-6 && copper.surface.two_sided);
+    assert_eq!((alpha, copper.surface.two_sided), (0.1, true));
+    let Anisotropy { strength, rotation, .. } = copper.surface.anisotropy;
+    assert!((strength * strength - 0.2 / 0.9).abs() < 1e-6 && rotation == FRAC_PI_2);
     assert_eq!(eta, Vec3::new(0.104, 0.978, 1.204));
     assert_eq!(k, Vec3::new(2.828, 2.625, 2.357));
     let (sunk, _) = material(
@@ -387,6 +393,11 @@ fn models_become_materials() {
     assert!((specular_color.x * 0.04 - 0.1).abs() < 1e-5 && warnings.len() == 1, "{warnings:?}");
     let ward = r#"<bsdf type="ward"><string name="variant" value="ward-duer"/></bsdf>"#;
     assert_eq!(material(ward).1.len(), 1);
+    let (glossy, warnings) = material(&ward.replace(
+        "<string",
+        r#"<float name="alpha_u" value="0.1"/><float name="alpha_v" value="0.325"/><string"#,
+    ));
+    assert!((glossy.surface.anisotropy.strength - 0.5).abs() < 1e-6 && warnings.len() == 1);
     let coated = r#"<bsdf type="coating"><bsdf type="diffuse"/></bsdf>"#;
     assert!(matches!(material(coated).0.kind, MaterialKind::Plastic { .. }));
     let gold = coated
@@ -459,6 +470,15 @@ fn principled_becomes_the_material_of_gltf() {
     let MaterialKind::Principled(Principled { base_color, .. }) = found.kind else { panic!() };
     assert_close(base_color, Vec3::splat(0.5 * (1.0 + 0.7874 * 0.031)));
     assert!(found.surface.metallic.is_some());
+    // The aspect is √(1 − 0.9 · 5/6) = ½: widths of 0.16 / ½ and 0.16 · ½.
+    let (brushed, warnings) = material(
+        r#"<bsdf type="principled"><float name="anisotropic" value="0.8333333"/>
+        <float name="roughness" value="0.4"/><float name="metallic" value="1"/></bsdf>"#,
+    );
+    let MaterialKind::Principled(Principled { roughness, .. }) = brushed.kind else { panic!() };
+    let [along, across] = brushed.surface.anisotropy.widths(roughness * roughness);
+    assert!((along - 0.32).abs() < 1e-5 && (across - 0.08).abs() < 1e-5, "{along} {across}");
+    assert_eq!((brushed.surface.anisotropy.rotation, warnings), (0.0, vec![]));
     let (glass, warnings) = material(
         r#"<bsdf type="principled"><rgb name="base_color" value="0.25"/>
         <float name="roughness" value="0.5"/><float name="eta" value="1.3"/>

@@ -3,14 +3,17 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use std::{f32::consts::PI, path::Path};
+use std::{
+    f32::consts::{FRAC_PI_2, PI},
+    path::Path,
+};
 
 use fenestra_scene::{
     Camera, Filter, Scene,
     coat::albedo_below_coat,
     lamp::{LampKind, SpotFalloff},
     load::LoadOptions,
-    material::{ConductorFresnel, Material, MaterialKind},
+    material::{Anisotropy, ConductorFresnel, Material, MaterialKind},
     math::equal_area::direction_from_square,
     texture::{Channels, Encoding, Interpolation, Texels, Wrap},
 };
@@ -319,6 +322,19 @@ fn materials_are_the_nearest() {
     close(eta, [1.6, 0.8, 0.5]);
     close(k, [4.049, 3.343, 2.393]);
     assert_eq!(alpha, 1e-3);
+    // Metal keeps two widths, of which the smaller is its own: 0.2 + 0.8 · 0.4 = 0.52 across.
+    for (u, v, rotation) in [(0.52, 0.2, 0.0), (0.2, 0.52, FRAC_PI_2)] {
+        let brushed = material(&format!(
+            r#""conductor" "bool remaproughness" false "float uroughness" {u} "float vroughness" {v}"#
+        ));
+        let MaterialKind::Conductor { alpha, .. } = brushed.kind else { panic!() };
+        let Anisotropy { strength, rotation: found, direction } = brushed.surface.anisotropy;
+        assert_eq!((alpha, found, direction), (0.2, rotation, None));
+        assert!((strength * strength - 0.4).abs() < 1e-6, "{strength}");
+    }
+    let glass = r#""dielectric" "bool remaproughness" false "float uroughness" 0.5 "float vroughness" 0.25"#;
+    let MaterialKind::Dielectric { alpha, .. } = material(glass).kind else { panic!() };
+    assert_eq!((alpha, material(glass).surface.anisotropy.strength), (0.375, 0.0));
     // The metal below a coat has a roughness of its own, and reflects less than in air.
     let coated = r#""coatedconductor" "float conductor.roughness" 0.25
         "float interface.roughness" 0.0625 "rgb conductor.eta" [1.5 1.5 0.3] "rgb conductor.k" [0 3 3]"#;
@@ -1364,7 +1380,8 @@ fn everything_left_out_is_named_once() {
         "ignored parameter `sharp` of Shape \"sphere\" (2, first in line 10)",
         "ignored exact form of `curve` (line 12): tubes of 3 to 6 sides",
         "ignored `albedo` of coats (line 13): coats are clear",
-        "ignored `uroughness` other than `vroughness` (line 13): their mean α, or the texture",
+        "ignored `uroughness` other than `vroughness`, of plastic and glass or textures (line 13): their \
+         mean α, or the texture",
         "ignored shapes whose transformation flattens space (2, first in line 14): left out",
         "ignored parameters of `hair` (line 15): rendered as diffuse of its `reflectance`, or 0.5",
         "ignored marble (line 16)",

@@ -4,6 +4,7 @@
 
 use std::{
     collections::HashSet,
+    f32::consts::FRAC_PI_2,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -13,7 +14,7 @@ use fenestra_scene::{
     lamp::{LampKind, Spot, SpotFalloff},
     light_group::LightGroups,
     load::{LoadOptions, arrays::Arrays},
-    material::{ConductorFresnel, Emission, MaterialKind, Principled, Surface},
+    material::{Anisotropy, ConductorFresnel, Emission, MaterialKind, Principled, Surface},
     mesh::Mesh,
     picture::{Image, RgbImage},
     still_hash,
@@ -288,8 +289,12 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
     case(
         &HEAD.replace("reflectance", "color"),
         "room.toml:13:1: unknown key `color` in material `grey` of type `diffuse`, expected one \
-         of `name`, `type`, `normal`, `opacity`, `opacity_cutoff`, `emission`, \
-         `emission_two_sided`, `two_sided`, `vertex_color`, `reflectance`",
+         of `name`, `type`, `normal`, `anisotropy`, `anisotropy_rotate_deg`, `opacity`, \
+         `opacity_cutoff`, `emission`, `emission_two_sided`, `two_sided`, `vertex_color`, `reflectance`",
+    );
+    case(
+        &HEAD.replace("reflectance", "anisotropy = 0.5\nreflectance"),
+        "anisotropy is for conductor and principled materials",
     );
     case(
         &HEAD.replace("reflectance = [0.5, 0.5, 0.5]", ""),
@@ -490,6 +495,8 @@ fn materials_take_textures_opacity_and_emission() {
         metallic = {{ texture = \"./wood.png\", channel = \"b\" }}
         roughness = {{ texture = \"wood.png\", factor = 0.8, wrap = \"mirror\" }}
         normal = {{ texture = \"wood.png\", strength = 2, interpolation = \"nearest\" }}
+        anisotropy = {{ texture = \"wood.png\", factor = 0.5 }}
+        anisotropy_rotate_deg = 90
         opacity = {{ texture = \"wood.png\", channel = \"a\" }}
         opacity_cutoff = 0.5
         emission = [1, 2, 3]
@@ -546,6 +553,9 @@ fn materials_take_textures_opacity_and_emission() {
     let normal = surface.normal.as_ref().unwrap();
     assert_eq!((normal.encoding, normal.interpolation), (Encoding::Linear, Interpolation::Nearest));
     assert_eq!(surface.normal_scale, 2.0);
+    let Anisotropy { strength, rotation, direction } = &surface.anisotropy;
+    assert_eq!((*strength, *rotation), (0.5, FRAC_PI_2));
+    assert_eq!(direction.as_ref().unwrap().encoding, Encoding::Linear);
     assert_eq!((surface.opacity.factor, surface.opacity.cutoff), (1.0, Some(0.5)));
     assert_eq!(surface.opacity.texture.as_ref().unwrap().channels, Channels::Alpha);
     let emission = surface.emission.as_ref().unwrap();
@@ -1058,8 +1068,18 @@ fn the_hash_follows_every_part_of_surfaces_and_lights() {
         let LampKind::Spot(spot) = &mut scene.lamps[0].kind else { panic!("a spot") };
         spot
     }
-    let changes: [fn(&mut Scene); 15] = [
+    fn stretched(scene: &mut Scene, rotation: f32, direction: Option<TextureUse>) {
+        surface(scene).anisotropy = Anisotropy { strength: 0.5, rotation, direction };
+    }
+    let changes: [fn(&mut Scene); 18] = [
         |_| (),
+        |scene| stretched(scene, 0.0, None),
+        |scene| stretched(scene, 0.5, None),
+        |scene| {
+            let texels = Texels::Bytes(vec![[1, 2, 3, 4]]);
+            let texture = Texture { name: "a".into(), width: 1, height: 1, texels };
+            stretched(scene, 0.0, Some(TextureUse::new(Arc::new(texture))));
+        },
         |scene| scene.environment.rotation_rad = 1.0,
         |scene| lit(scene, false),
         |scene| lit(scene, true),

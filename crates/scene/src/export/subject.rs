@@ -1,6 +1,6 @@
 //! Translation of materials, as far as all formats share it.
 
-use std::path::Path;
+use std::{f32::consts::FRAC_PI_2, path::Path};
 
 use glam::{Vec2, Vec3};
 
@@ -82,6 +82,30 @@ impl<'a> Subject<'a> {
         if material.coat_weight > 0.0 {
             self.warn("its coat is left out");
         }
+    }
+
+    /// Widths of GGX along tangent and bitangent, where they differ; with the names of what the formats that
+    /// have no more than these lose.
+    pub(super) fn widths(&mut self, alpha: f32) -> Option<[f32; 2]> {
+        let anisotropy = &self.surface.anisotropy;
+        if anisotropy.strength == 0.0 {
+            return None;
+        }
+        let [along, across] = anisotropy.widths(alpha);
+        let quarters = anisotropy.rotation / FRAC_PI_2;
+        let is_straight = (quarters - quarters.round()).abs() < 1e-3;
+        if self.surface.roughness.is_some() {
+            self.warn("its highlights are stretched by a texture of roughness; they become round");
+            return None;
+        }
+        if !is_straight || anisotropy.direction.is_some() {
+            self.warn(
+                "its highlights are stretched in another direction than u and v; they become round",
+            );
+            return Some([0.5 * (along + across); 2]);
+        }
+        let is_along_u = quarters.round().rem_euclid(2.0) == 0.0;
+        Some(if is_along_u { [along, across] } else { [across, along] })
     }
 
     /// Image of the GGX width, if the roughness has one.

@@ -21,6 +21,13 @@ pub(crate) struct MaterialKeys {
     pub r#type: Spanned<String>,
     /// Red, green and blue, 0…1, stand for −1…1 along u, v and the normal.
     pub normal: Option<TextureEntry>,
+    /// Stretches highlights of `conductor` and `principled`, 0…1 ([shading](shading.md)). A texture has
+    /// another tangent in red and green, and a factor in blue.
+    #[serde(default = "default_anisotropy")]
+    pub anisotropy: Textured<f32>,
+    /// Angle from the tangent, along u, to where they are widest.
+    #[serde(default)]
+    pub anisotropy_rotate_deg: f32,
     /// Share of light that the surface stops, 0…1; the rest goes straight through. Default: 1.
     pub opacity: Option<Textured<f32>>,
     /// Opacity from which the surface is opaque, and below which it is not there. Default: none.
@@ -40,6 +47,10 @@ pub(crate) struct MaterialKeys {
 
 fn default_two_sided() -> bool {
     true
+}
+
+fn default_anisotropy() -> Textured<f32> {
+    Textured::Uniform(0.0)
 }
 
 /// Keys of a `[[material]]` that depend on its `type`.
@@ -218,7 +229,8 @@ impl MaterialEntry {
         };
         let opacity = keys.opacity.as_ref().and_then(Textured::texture);
         let emission = keys.emission.as_ref().and_then(Textured::texture);
-        let all = [color, roughness, metallic, keys.normal.as_ref(), opacity, emission];
+        let (normal, direction) = (keys.normal.as_ref(), keys.anisotropy.texture());
+        let all = [color, roughness, metallic, normal, direction, opacity, emission];
         all.into_iter().flatten()
     }
 }

@@ -10,7 +10,7 @@ use crate::{
     MIN_ALPHA,
     coat::{DIELECTRIC, metallic_roughness, normal_reflectance},
     features::Feature,
-    material::{Material, MaterialKind, Principled, Surface},
+    material::{Anisotropy, Material, MaterialKind, Principled, Surface},
     math::colour::luminance,
     texture::{
         Channels, TextureUse,
@@ -111,20 +111,22 @@ fn blend_lobes(
     };
     let share = share_image.map_or(share.clone(), |image| factor(Some(image)));
     let [own_factors, other_factors] = [own_images, other_images].map(|images| images.map(factor));
-    let lobes = |kind: &MaterialKind, factors: &[Value; 3], index: usize| {
+    let lobes = |kind: &MaterialKind, surface: &Surface, factors: &[Value; 3], index: usize| {
         let [color, rough, metal] =
             factors.each_ref().map(|factor| factor.at(&grid, index).truncate());
-        Lobes::of(&kind.scaled(color, luminance(rough), luminance(metal))).unwrap_or_default()
+        let kind = kind.scaled(color, luminance(rough), luminance(metal));
+        Lobes::of(&surface.anisotropy.rounded(kind)).unwrap_or_default()
     };
     let mixture = |index: usize| {
         let share = luminance(share.at(&grid, index).truncate()).clamp(0.0, 1.0);
-        let pair = [lobes(first, &own_factors, index), lobes(second, &other_factors, index)];
-        Lobes::mixed(pair, share)
+        let one = lobes(first, own, &own_factors, index);
+        Lobes::mixed([one, lobes(second, other, &other_factors, index)], share)
     };
     let rest = Surface {
         color: None,
         roughness: None,
         metallic: None,
+        anisotropy: Anisotropy::default(),
         normal: own.normal.clone().or(other.normal.clone()),
         two_sided: own.two_sided || other.two_sided,
         ..own.clone()

@@ -10,10 +10,10 @@ use std::path::PathBuf;
 use glam::{DVec3, Vec3, Vec4};
 
 use crate::{
-    Asked, EnvironmentMap, FilmSettings, Geometry, Lamp,
+    Asked, EnvironmentMap, FilmSettings, Geometry, Lamp, MIN_ALPHA,
     features::{Feature, Ignored},
     file::CameraEntry,
-    material::{Material, MaterialKind},
+    material::{Anisotropy, Material, MaterialKind},
     texture::{
         TextureUse,
         linear::{Texelwise, lie_alike},
@@ -48,9 +48,38 @@ pub(crate) struct Width {
     pub alpha: f32,
     /// Factor of √α, for which `alpha` is then 1.
     pub texture: Option<TextureUse>,
+    /// Stretch of the width, of which `alpha` is then the smaller.
+    pub anisotropy: Anisotropy,
 }
 
 impl Width {
+    pub(crate) fn round(alpha: f32, texture: Option<TextureUse>) -> Self {
+        Self { alpha, texture, anisotropy: Anisotropy::default() }
+    }
+
+    /// Width of two along u and v.
+    pub(crate) fn of_pair(widths: [f32; 2]) -> Self {
+        let (alpha, anisotropy) = Anisotropy::of_widths(widths);
+        Self { alpha, texture: None, anisotropy }
+    }
+
+    /// Width of a roughness √α that the parameter `anisotropic` of \[Burley 2012\], 0…1, stretches.
+    pub(crate) fn stretched(roughness: f32, anisotropic: f32) -> Self {
+        let aspect = (1.0 - 0.9 * anisotropic).sqrt();
+        let alpha = roughness * roughness;
+        Self::of_pair([alpha / aspect, alpha * aspect].map(|width| width.clamp(MIN_ALPHA, 1.0)))
+    }
+
+    /// Mean of all directions, for a model without anisotropy; counts the loss as `feature`.
+    pub(crate) fn rounded(mut self, ignore: impl FnOnce()) -> Self {
+        if self.anisotropy.strength > 0.0 {
+            ignore();
+            self.alpha = 0.5 * self.anisotropy.widths(self.alpha).iter().sum::<f32>();
+            self.anisotropy = Anisotropy::default();
+        }
+        self
+    }
+
     /// √α, by the mean of an image.
     pub(crate) fn mean_roughness(&self) -> f32 {
         self.texture.as_ref().map_or(self.alpha.sqrt(), |texture| texture.mean()[0])

@@ -13,7 +13,10 @@ use crate::{
     coat::COAT_IOR,
     error::{Error, Result},
     file::{MaterialEntry, MaterialKeys, MaterialKindEntry, TextureEntry, Textured},
-    material::{ConductorFresnel, Emission, Material, MaterialKind, Opacity, Principled, Surface},
+    material::{
+        Anisotropy, ConductorFresnel, Emission, Material, MaterialKind, Opacity, Principled,
+        Surface,
+    },
     measured::MeasuredFiles,
     texture::{Encoding, Texture, TextureCache, TextureUse},
     transform::sine_cosine_deg,
@@ -63,6 +66,10 @@ impl Loader<'_> {
             }
             reader.read_surface(&entry.keys)?;
             let kind = reader.kind(&entry.kind)?;
+            let can_stretch =
+                matches!(kind, MaterialKind::Conductor { .. } | MaterialKind::Principled(_));
+            let message = "anisotropy is for conductor and principled materials";
+            reader.check(can_stretch || reader.surface.anisotropy.strength == 0.0, message)?;
             let surface = std::mem::take(&mut reader.surface);
             scene.materials.push(Material { name: name.clone(), kind, surface });
         }
@@ -113,6 +120,10 @@ impl Reader<'_> {
             self.surface.normal = Some(self.texture_use("normal", entry, Encoding::Linear)?);
             self.surface.normal_scale = strength;
         }
+        let (strength, direction) = self.number("anisotropy", &keys.anisotropy, SHARE)?;
+        self.check_range("anisotropy_rotate_deg", &[keys.anisotropy_rotate_deg], FINITE)?;
+        let rotation = keys.anisotropy_rotate_deg.to_radians();
+        self.surface.anisotropy = Anisotropy { strength, rotation, direction };
         if let Some(opacity) = &keys.opacity {
             let (factor, texture) = self.number("opacity", opacity, SHARE)?;
             self.surface.opacity = Opacity { factor, texture, cutoff: None };

@@ -62,8 +62,7 @@ impl Loader<'_> {
         };
         let own_materials = keys(&|named| named.is_none());
         // Shapes without textures need no texture coordinates, and their scenes keep their hashes.
-        let textured =
-            keys(&|named| named.is_some_and(|own| own.surface.textures().next().is_some()));
+        let textured = keys(&|named| named.is_some_and(|own| own.surface.reads_uvs()));
         let colored = keys(&|named| named.is_some_and(|own| own.surface.vertex_color));
         // Read all meshes before placing any, so that the arrays are allocated once.
         let mut meshes = HashMap::new();

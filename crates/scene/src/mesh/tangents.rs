@@ -1,4 +1,4 @@
-//! Tangents of vertices that a normal texture needs and the file does not give: MikkTSpace.
+//! Tangents that normal maps or stretched highlights need and the file does not give: MikkTSpace.
 //!
 //! \[Mikkelsen 2008\], by the crate `bevy_mikktspace`; glTF 2.0, section 3.7.2.1, asks for it.
 
@@ -10,7 +10,7 @@ use glam::Vec3;
 use super::Mesh;
 
 impl Mesh {
-    /// Gives tangents to the triangles whose material has a normal texture, unless they have some.
+    /// Gives tangents to the triangles whose material reads them, unless they have some.
     /// `up` is the sign of v upwards in an image: −1 for coordinates from the upper left corner.
     ///
     /// A vertex is repeated where its triangles need different tangents.
@@ -35,9 +35,8 @@ impl Mesh {
     fn faces_without_tangents(&self, uv_set: u32) -> Vec<usize> {
         let mut faces = Vec::new();
         for (triangles, material) in self.material_runs() {
-            let normal = material
-                .and_then(|material| self.materials[material].material.surface.normal.as_ref());
-            if normal.is_some_and(|normal| normal.uv_set == uv_set) {
+            let surface = material.map(|material| &self.materials[material].material.surface);
+            if surface.and_then(|surface| surface.tangent_uv_set()) == Some(uv_set) {
                 faces.extend(triangles.filter(|&face| {
                     let has_none = |&vertex: &u32| {
                         self.tangents.get(vertex as usize).is_none_or(|t| t[..3] == [0.0; 3])

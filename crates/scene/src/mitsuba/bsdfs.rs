@@ -103,18 +103,23 @@ impl Reader {
                     self.ignored.add(features::MI_POLARIZED, || node.place());
                 }
                 let width = self.width(&parameters)?;
+                let width =
+                    width.rounded(|| self.ignored.add(features::MI_ANISOTROPIC, || node.place()));
                 self.plastic(&parameters, Some(width))?
             }
             "conductor" | "mirror" => self.conductor(&parameters, None)?,
             "roughconductor" | "roughmetal" => {
-                let Width { alpha, texture } = self.width(&parameters)?;
+                let Width { alpha, texture, anisotropy } = self.width(&parameters)?;
                 let mut model = self.conductor(&parameters, Some(alpha))?;
                 model.surface.roughness = texture;
+                model.surface.anisotropy = anisotropy;
                 model
             }
             "dielectric" => self.dielectric(&parameters, Some(0.0))?,
             "roughdielectric" | "roughglass" => {
-                let Width { alpha, texture } = self.width(&parameters)?;
+                let width = self.width(&parameters)?;
+                let Width { alpha, texture, .. } =
+                    width.rounded(|| self.ignored.add(features::MI_ANISOTROPIC, || node.place()));
                 let mut model = self.dielectric(&parameters, Some(alpha))?;
                 model.surface.roughness = texture;
                 model
@@ -241,10 +246,7 @@ impl Reader {
         let mut width = |name: &str| self.value(parameters, name, Role::Index);
         let value = match (width("alpha_u")?, width("alpha_v")?) {
             (Some(Value::Constant(u)), Some(Value::Constant(v))) => {
-                if u != v {
-                    self.ignored.add(features::MI_ANISOTROPIC, || node.place());
-                }
-                Some(Value::Constant(0.5 * (u + v)))
+                return Ok(Width::of_pair([u, v].map(|width| width.x.clamp(MIN_ALPHA, 1.0))));
             }
             (Some(one), other) => {
                 if !matches!((&one, &other), (Value::Image(u), Some(Value::Image(v))) if u == v) {
@@ -257,12 +259,12 @@ impl Reader {
         Ok(match value {
             Some(Value::Image(texture)) => {
                 let root = |alpha: f32| alpha.clamp(MIN_ALPHA, 1.0).sqrt();
-                Width { alpha: 1.0, texture: Some(numbers(&texture).mapped(root)) }
+                Width::round(1.0, Some(numbers(&texture).mapped(root)))
             }
             value => {
                 let alpha = self.without_texture(value, node, features::MI_ALPHA_TEXTURE);
                 let alpha = alpha.map_or(0.1, |alpha| alpha.x).clamp(MIN_ALPHA, 1.0);
-                Width { alpha, texture: None }
+                Width::round(alpha, None)
             }
         })
     }
@@ -319,7 +321,7 @@ impl Reader {
         } else if is_nonlinear {
             value = value.mapped(albedo_below_coat(ior));
         }
-        let Width { alpha, texture } = width.unwrap_or(Width { alpha: MIN_ALPHA, texture: None });
+        let Width { alpha, texture, .. } = width.unwrap_or(Width::round(MIN_ALPHA, None));
         let plastic = |diffuse| MaterialKind::Plastic { diffuse, alpha, ior };
         let mut model = colored(value, plastic);
         model.surface.roughness = texture;

@@ -90,9 +90,10 @@ impl Reader {
     pub(super) fn coating(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let mut model = self.inner(parameters)?;
         let width = if parameters.node.kind() == "coating" {
-            Width { alpha: MIN_ALPHA, texture: None }
+            Width::round(MIN_ALPHA, None)
         } else {
-            self.width(parameters)?
+            let width = self.width(parameters)?;
+            width.rounded(|| self.ignored.add(features::MI_ANISOTROPIC, || parameters.node.place()))
         };
         let ior = self.ior(parameters, "bk7")?;
         let coated = |reflectance, alpha| {
@@ -119,14 +120,14 @@ impl Reader {
     pub(super) fn phong(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let node = parameters.node;
         self.ignored.add(features::MI_PHONG, || node.place());
-        let alpha = if node.kind() == "ward" {
+        let Width { alpha, anisotropy, .. } = if node.kind() == "ward" {
             parameters.without_effect("variant");
-            self.width_of(parameters)?.alpha
+            self.width_of(parameters)?
         } else {
             let exponent = self.value_or(parameters, "exponent", Role::Index, 30.0)?;
             let exponent = exponent.mean().x.max(0.0);
             // A cosine power about the mirror direction is one of four times it about the normal.
-            (2.0 / (4.0 * exponent + 2.0)).sqrt()
+            Width::round((2.0 / (4.0 * exponent + 2.0)).sqrt(), None)
         };
         let diffuse = self.value_or(parameters, "diffuse_reflectance", Role::Reflectance, 0.5)?;
         let specular = self.value_or(parameters, "specular_reflectance", Role::Reflectance, 0.2)?;
@@ -137,8 +138,10 @@ impl Reader {
         let (roughness, metallic) = (alpha.clamp(MIN_ALPHA, 1.0).sqrt(), 0.0);
         let specular_color = specular / DIELECTRIC;
         let rest = Principled { metallic, roughness, specular_color, ..Principled::default() };
-        Ok(colored(diffuse, |base_color| {
+        let mut model = colored(diffuse, |base_color| {
             MaterialKind::Principled(Principled { base_color, ..rest })
-        }))
+        });
+        model.surface.anisotropy = anisotropy;
+        Ok(model)
     }
 }

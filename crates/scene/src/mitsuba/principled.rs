@@ -8,13 +8,15 @@ use crate::{
     coat::{COAT_IOR, normal_reflectance, principled_base_factor},
     error::Result,
     features,
-    import::Value,
+    import::{Value, Width},
     material::{Material, MaterialKind, Principled},
     math::colour::luminance,
 };
 
+/// Largest value of `anisotropic`, which Mitsuba does not limit: of widths as 1 to 1,000.
+const MOST_ANISOTROPIC: f32 = 1.11;
 /// Parameters without a counterpart, which change nothing at 0.
-const WITHOUT_COUNTERPART: [&str; 4] = ["anisotropic", "spec_tint", "sheen", "flatness"];
+const WITHOUT_COUNTERPART: [&str; 3] = ["spec_tint", "sheen", "flatness"];
 
 impl Reader {
     /// Names parameters that are left out, where they are not 0.
@@ -43,6 +45,8 @@ impl Reader {
         let coat_weight = 0.25 * luminance(coat.mean()).clamp(0.0, 1.0);
         let gloss = luminance(number("clearcoat_gloss", 0.0)?.mean()).clamp(0.0, 1.0);
         let coat_roughness = (0.1 - gloss * (0.1 - MIN_ALPHA)).sqrt();
+        let anisotropic = luminance(number("anisotropic", 0.0)?.mean());
+        let anisotropic = anisotropic.clamp(0.0, MOST_ANISOTROPIC);
         self.without_counterpart(parameters, &WITHOUT_COUNTERPART)?;
         parameters.without_effect(
             "sheen_tint diffuse_reflectance_sampling_rate main_specular_sampling_rate \
@@ -86,7 +90,12 @@ impl Reader {
         let factor = 1.0 + diffuse_share * (factor - 1.0);
         let base = base.mapped(|albedo| (factor * albedo).clamp(0.0, 1.0));
         let (metallic, metallic_texture) = metallic.split();
-        let (roughness, roughness_texture) = roughness.split();
+        let mean_roughness = luminance(roughness.mean());
+        let Width { alpha, anisotropy, .. } = Width::stretched(mean_roughness, anisotropic);
+        let (mut roughness, roughness_texture) = roughness.split();
+        if anisotropy.strength > 0.0 && mean_roughness > 0.0 {
+            roughness.x *= alpha.sqrt() / mean_roughness;
+        }
         // An index of 1 has no reflection at all, which the factor says better.
         let (ior, specular) = if ior < COAT_IOR.0 { (1.5, 0.0) } else { (ior, 1.0) };
         let mut model = colored(base, |base_color| {
@@ -103,6 +112,7 @@ impl Reader {
         });
         model.surface.metallic = metallic_texture;
         model.surface.roughness = roughness_texture;
+        model.surface.anisotropy = anisotropy;
         Ok(model)
     }
 }

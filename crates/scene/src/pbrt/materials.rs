@@ -89,7 +89,7 @@ impl<'a> Materials<'a> {
                 self.coated_conductor(entity, &mut surface)?
             }
             "dielectric" => {
-                let roughness = self.roughness(entity, "")?;
+                let roughness = self.round_roughness(entity, "")?;
                 surface.roughness = roughness.texture;
                 let alpha = if roughness.alpha < SMOOTH_ALPHA { 0.0 } else { roughness.alpha };
                 MaterialKind::glass(self.ior(entity, "eta", SOLID_IOR)?, alpha)
@@ -187,7 +187,7 @@ impl<'a> Materials<'a> {
             Some(texture) => *texture = texture.mapped(below),
             None => diffuse = diffuse.map(below),
         }
-        let roughness = self.roughness(entity, "")?;
+        let roughness = self.round_roughness(entity, "")?;
         surface.roughness = roughness.texture;
         Ok(MaterialKind::Plastic { diffuse, alpha: roughness.alpha, ior })
     }
@@ -200,6 +200,7 @@ impl<'a> Materials<'a> {
     ) -> Result<MaterialKind> {
         let roughness = self.roughness(entity, prefix)?;
         surface.roughness = roughness.texture;
+        surface.anisotropy = roughness.anisotropy;
         let own = |name: &str| format!("{prefix}{name}");
         let reflectance = match self.textures.spectrum(entity, &own("reflectance"))? {
             // coatedconductor names this one without a prefix.
@@ -214,6 +215,7 @@ impl<'a> Materials<'a> {
             Some(Value::Constant(color))
                 if color.min_element() >= MIRROR_REFLECTANCE
                     && surface.roughness.is_none()
+                    && surface.anisotropy.strength == 0.0
                     && roughness.alpha < SMOOTH_ALPHA =>
             {
                 return Ok(MaterialKind::Mirror { reflectance: Vec3::ONE });
@@ -243,7 +245,7 @@ impl<'a> Materials<'a> {
         if (ior - DEFAULT_IOR).abs() > 0.01 {
             self.textures.log.ignore(features::PBRT_COAT_INDEX, &entity.place);
         }
-        let coat_roughness = self.roughness(entity, "interface.")?.mean_roughness();
+        let coat_roughness = self.round_roughness(entity, "interface.")?.mean_roughness();
         let below = |eta: Vec3, k: Vec3| {
             ConductorFresnel::Exact { eta: eta / ior, k: k / ior }.at_normal_incidence()
         };
@@ -291,19 +293,22 @@ impl<'a> Materials<'a> {
         let both = number("roughness")?.unwrap_or(Value::number(0.0));
         let along_u = number("uroughness")?.unwrap_or(both.clone());
         let along_v = number("vroughness")?.unwrap_or(both);
-        if along_u != along_v {
-            self.textures.log.ignore(features::PBRT_ANISOTROPY, &entity.place);
-        }
         match (along_u, along_v) {
-            (Value::Image(image), _) | (_, Value::Image(image)) => {
+            (Value::Image(image), other) | (other, Value::Image(image)) => {
+                if other.image() != Some(&image) {
+                    self.textures.log.ignore(features::PBRT_ANISOTROPY, &entity.place);
+                }
                 let texture = map_numbers(&image, |roughness| alpha_of(roughness).min(1.0).sqrt());
-                Ok(Width { alpha: 1.0, texture: Some(texture) })
+                Ok(Width::round(1.0, Some(texture)))
             }
-            (u, v) => {
-                let alpha = 0.5 * (alpha_of(u.mean().x) + alpha_of(v.mean().x));
-                Ok(Width { alpha: alpha.min(1.0), texture: None })
-            }
+            (u, v) => Ok(Width::of_pair([u, v].map(|value| alpha_of(value.mean().x).min(1.0)))),
         }
+    }
+
+    /// The same for a model whose width is one for all directions.
+    fn round_roughness(&mut self, entity: &Entity, prefix: &str) -> Result<Width> {
+        let width = self.roughness(entity, prefix)?;
+        Ok(width.rounded(|| self.textures.log.ignore(features::PBRT_ANISOTROPY, &entity.place)))
     }
 
     /// The mixture, else the material of the greater share; its opacity is the share if the other is

@@ -221,7 +221,7 @@ impl Builder<'_> {
         self.materials.textures.log.unused(&shape.entity);
         let Some(material) = material else { return Ok(None) };
         let surface = &self.made[material as usize].surface;
-        if surface.textures().next().is_some() {
+        if surface.reads_uvs() {
             let error = |message: String| shape.entity.error(message);
             shapes::give_coordinates(&mut mesh).map_err(error)?;
         }

@@ -115,7 +115,7 @@ impl Buffer {
     /// Adds the triangles of a part, with what `surface` reads of its vertices, and returns a primitive
     /// without material.
     pub(super) fn primitive(&mut self, part: &Part, is_flat: bool, surface: &Surface) -> Value {
-        let (vertices, has_frames) = (&part.vertices, surface.normal.is_some());
+        let (vertices, has_frames) = (&part.vertices, surface.tangent_uv_set().is_some());
         let around = bounds(vertices.iter().map(|vertex| vertex.position)).unwrap_or_default();
         let index = self.vectors(vertices, |vertex| vertex.position.to_array());
         for (name, corner) in ["min", "max"].into_iter().zip(around) {
@@ -133,7 +133,8 @@ impl Buffer {
             };
             members["TANGENT"] = self.vectors(vertices, tangent).into();
         }
-        let uv_sets = surface.textures().map(|used| used.uv_set as usize + 1).max().unwrap_or(0);
+        let read = surface.textures().map(|used| used.uv_set).chain(surface.tangent_uv_set());
+        let uv_sets = read.map(|set| set as usize + 1).max().unwrap_or(0);
         for set in 0..uv_sets {
             let index = self.vectors(vertices, |vertex| vertex.uvs[set].to_array());
             members[format!("TEXCOORD_{set}")] = index.into();
@@ -189,8 +190,8 @@ pub(super) enum Layout {
     ColorOpacity(Vec3),
     /// Roughness in green, metallic share in blue, both linear.
     RoughnessMetal,
-    /// Components of normals, linear.
-    Normal,
+    /// Components of vectors, linear.
+    Vector,
 }
 
 /// Image to write. At least one of the textures is there; if both are, they have the same size.
@@ -247,7 +248,7 @@ impl Sheet {
                     let [rough, metal] = [first, second].map(|v| luminance(v).clamp(0.0, 1.0));
                     [1.0, rough, metal, 1.0]
                 }
-                Layout::Normal => first.clamp(Vec3::ZERO, Vec3::ONE).extend(1.0).to_array(),
+                Layout::Vector => first.clamp(Vec3::ZERO, Vec3::ONE).extend(1.0).to_array(),
             }
         };
         (0..count).map(texel).collect()

@@ -7,7 +7,7 @@ use super::document::{Layout, Sheet, Textures, peak};
 use crate::{
     coat::DEFAULT_IOR,
     export::subject::Subject,
-    material::{ConductorFresnel, Emission, MaterialKind, Principled},
+    material::{Anisotropy, ConductorFresnel, Emission, MaterialKind, Principled},
     texture::TextureUse,
 };
 
@@ -45,11 +45,12 @@ impl<'a> Translator<'a> {
             _ => surface.color.as_ref(),
         };
         self.pbr(&core, color);
+        self.anisotropy();
         if let Some(emission) = surface.emission.as_ref().filter(|_| !is_unlit) {
             self.emission(emission);
         }
         let normal = surface.normal.as_ref().filter(|_| !is_unlit);
-        if let Some(mut info) = self.texture(Layout::Normal, [normal, None]) {
+        if let Some(mut info) = self.texture(Layout::Vector, [normal, None]) {
             if surface.normal_scale != 1.0 {
                 info["scale"] = json!(surface.normal_scale);
             }
@@ -156,6 +157,17 @@ impl<'a> Translator<'a> {
         }
     }
 
+    fn anisotropy(&mut self) {
+        let Anisotropy { strength, rotation, direction } = &self.subject.surface.anisotropy;
+        if *strength > 0.0 {
+            let mut model = json!({"anisotropyStrength": strength, "anisotropyRotation": rotation});
+            if let Some(info) = self.texture(Layout::Vector, [direction.as_ref(), None]) {
+                model["anisotropyTexture"] = info;
+            }
+            self.extension("KHR_materials_anisotropy", model);
+        }
+    }
+
     fn diffuse(&mut self, reflectance: Vec3) -> Principled {
         self.dielectric(DEFAULT_IOR, 0.0, Vec3::ONE);
         core(reflectance, 0.0, 1.0)
@@ -226,7 +238,7 @@ impl<'a> Translator<'a> {
         if second.is_some() && kept.is_none() {
             let [first, second] = match layout {
                 Layout::RoughnessMetal => ["roughness", "metal"],
-                Layout::ColorOpacity(_) | Layout::Normal => ["colour", "opacity"],
+                Layout::ColorOpacity(_) | Layout::Vector => ["colour", "opacity"],
             };
             self.subject.warn(&format!(
                 "its textures of {first} and {second} lie on the surface in two ways or differ in \

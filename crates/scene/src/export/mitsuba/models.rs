@@ -253,14 +253,25 @@ impl Translator<'_> {
     }
 
     fn roughness(&mut self, factor: f32) -> String {
-        self.number("roughness", factor, self.subject.surface.roughness.as_ref())
+        match self.subject.widths(factor * factor) {
+            None => self.number("roughness", factor, self.subject.surface.roughness.as_ref()),
+            Some([along_u, along_v]) if along_u < along_v => {
+                self.subject.warn("its highlights are widest along v; they become round");
+                float("roughness", (0.5 * (along_u + along_v)).sqrt())
+            }
+            Some([along_u, along_v]) => {
+                float("roughness", (along_u * along_v).powf(0.25))
+                    + &float("anisotropic", (1.0 - along_v / along_u) / 0.9)
+            }
+        }
     }
 
     /// Parameters of a GGX model of width `alpha`.
     fn ggx(&mut self, alpha: f32) -> String {
-        let alpha = match self.subject.width(alpha) {
-            Some((used, recipe)) => self.bitmap("alpha", used, recipe),
-            None => float("alpha", alpha),
+        let alpha = match (self.subject.widths(alpha), self.subject.width(alpha)) {
+            (Some([along_u, along_v]), _) => float("alpha_u", along_u) + &float("alpha_v", along_v),
+            (None, Some((used, recipe))) => self.bitmap("alpha", used, recipe),
+            (None, None) => float("alpha", alpha),
         };
         property("string", "distribution", "ggx") + &alpha
     }

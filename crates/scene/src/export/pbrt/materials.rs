@@ -189,9 +189,12 @@ impl<'a> Translator<'a> {
     }
 
     fn roughness(&mut self, alpha: f32) -> String {
-        let width = match self.subject.width(alpha) {
-            Some((used, recipe)) => self.texture("roughness", used, recipe),
-            None => float("roughness", alpha),
+        let width = match (self.subject.widths(alpha), self.subject.width(alpha)) {
+            (Some([along_u, along_v]), _) => {
+                float("uroughness", along_u) + &float("vroughness", along_v)
+            }
+            (None, Some((used, recipe))) => self.texture("roughness", used, recipe),
+            (None, None) => float("roughness", alpha),
         };
         width + " \"bool remaproughness\" false"
     }

@@ -20,8 +20,7 @@ const OTHER_PARTS: &str =
     "accessors animations bufferViews buffers cameras images samplers scenes skins textures";
 
 /// Factors whose default is 0, without which an extension changes nothing.
-const FACTORS: [(&str, &str); 4] = [
-    ("KHR_materials_anisotropy", "anisotropyStrength"),
+const FACTORS: [(&str, &str); 3] = [
     ("KHR_materials_dispersion", "dispersion"),
     ("KHR_materials_iridescence", "iridescenceFactor"),
     ("KHR_materials_sheen", "sheenColorFactor"),

@@ -9,7 +9,7 @@ use crate::{
     error::Result,
     features::{self, Feature, Ignored},
     import::{Value, sheet},
-    material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
+    material::{Anisotropy, Emission, Material, MaterialKind, Opacity, Principled, Surface},
     mesh::{MeshMaterial, label},
     texture::{
         Channels, Encoding, TextureUse,
@@ -192,6 +192,7 @@ impl GltfReader<'_> {
             self.transmission(&mut reading, &mut reflection, is_glass)?;
             self.diffuse_transmission(&mut reading, &mut reflection)?;
             self.coat(&mut reading, &mut reflection)?;
+            self.anisotropy(&mut reading, &mut reflection)?;
             let normal = &json["normalTexture"];
             reflection.surface.normal = self.texture(normal, VECTOR, &mut reading)?;
             reflection.surface.normal_scale = number(normal, "scale", 1.0);
@@ -433,6 +434,24 @@ impl GltfReader<'_> {
             }
             _ => reading.ignore(features::GLTF_CLEARCOAT),
         }
+        Ok(())
+    }
+
+    /// Stretches the highlights of a metallic-roughness material by `KHR_materials_anisotropy`.
+    fn anisotropy(&mut self, reading: &mut Reading, found: &mut Reflection) -> Result<()> {
+        let json = reading.json;
+        let model = &json["extensions"]["KHR_materials_anisotropy"];
+        let strength = share(model, "anisotropyStrength", 0.0);
+        if strength == 0.0 {
+            return Ok(());
+        }
+        if !matches!(found.kind, MaterialKind::Principled(_)) {
+            reading.ignore(features::GLTF_ANISOTROPY);
+            return Ok(());
+        }
+        let rotation = number(model, "anisotropyRotation", 0.0);
+        let direction = self.texture(&model["anisotropyTexture"], VECTOR, reading)?;
+        found.surface.anisotropy = Anisotropy { strength, rotation, direction };
         Ok(())
     }
 

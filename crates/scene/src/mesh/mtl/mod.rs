@@ -62,6 +62,9 @@ pub(super) struct LibraryMaterial {
     metallic: Option<f32>,
     coat_weight: Option<f32>,
     coat_roughness: Option<f32>,
+    anisotropy: Option<f32>,
+    /// Turn of its direction about the normal.
+    anisotropy_turns: Option<f32>,
     color_map: Option<Map>,
     opacity_map: Option<Map>,
     emission_map: Option<Map>,
@@ -148,9 +151,10 @@ impl<'a> Library<'a> {
             "ka" if color == Some(Vec3::ZERO) => {}
             "pc" if share.is_some() => entry.coat_weight = share,
             "pcr" if share.is_some() => entry.coat_roughness = share,
-            // A sheen or an anisotropy of strength 0 changes nothing.
-            "ps" | "aniso" if share == Some(0.0) => {}
-            "anisor" => {}
+            // A sheen of strength 0 changes nothing.
+            "ps" if share == Some(0.0) => {}
+            "aniso" if share.is_some() => entry.anisotropy = share,
+            "anisor" if share.is_some() => entry.anisotropy_turns = share,
             "ka" => entry.ignore(features::MTL_KA, features::MTL_KA.name),
             "map_kd" => entry.color_map = map(entry),
             "map_d" => entry.opacity_map = map(entry),

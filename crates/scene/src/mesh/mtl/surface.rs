@@ -1,11 +1,14 @@
 //! Keys of an MTL material → the material of a scene.
 
+use std::f32::consts::TAU;
+
 use glam::Vec3;
 
 use super::{LibraryMaterial, Map};
 use crate::{
     coat::{COAT_IOR, DEFAULT_IOR},
     features::{self, Feature},
+    import::Width,
     material::{Emission, Material, MaterialKind, Opacity, Principled, Surface},
     mesh::MeshMaterial,
     texture::{
@@ -92,10 +95,17 @@ impl LibraryMaterial {
         let kind = if self.is_metallic_roughness() {
             let one_if = |texture: bool, otherwise| if texture { 1.0 } else { otherwise };
             let roughness = one_if(surface.roughness.is_some(), DEFAULT_ROUGHNESS);
+            let mut roughness = self.roughness.unwrap_or(roughness);
+            let width = Width::stretched(roughness, self.anisotropy.unwrap_or(0.0));
+            if width.anisotropy.strength > 0.0 {
+                roughness = width.mean_roughness();
+                surface.anisotropy = width.anisotropy;
+                surface.anisotropy.rotation += TAU * self.anisotropy_turns.unwrap_or(0.0);
+            }
             MaterialKind::Principled(Principled {
                 base_color: diffuse,
                 metallic: self.metallic.unwrap_or(one_if(surface.metallic.is_some(), 0.0)),
-                roughness: self.roughness.unwrap_or(roughness),
+                roughness,
                 ior,
                 coat_weight: self.coat_weight.unwrap_or(0.0),
                 coat_roughness: self.coat_roughness.unwrap_or(0.0),
@@ -137,7 +147,7 @@ impl LibraryMaterial {
     fn is_metallic_roughness(&self) -> bool {
         self.roughness.is_some()
             || self.metallic.is_some()
-            || self.coat_weight.is_some_and(|weight| weight > 0.0)
+            || [self.coat_weight, self.anisotropy].into_iter().flatten().any(|share| share > 0.0)
             || self.roughness_map.is_some()
             || self.metallic_map.is_some()
     }
