@@ -281,7 +281,7 @@ vec2 turned_by(vec2 vector, vec2 direction) {
 GgxWidth stretched_width(
     float alpha, vec2 axis, vec4 tangent, vec3 tangent_normal, vec3 shading_normal
 ) {
-    float strength = length(axis);
+    float strength = min(length(axis), 1.0);
     float along = mix(alpha, 1.0, strength * strength);
     float mean = 0.5 * (along + alpha);
     if (along <= alpha) {

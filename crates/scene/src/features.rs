@@ -40,7 +40,7 @@ features! {
     GLTF_LIGHT_RANGE "range of lights" "light falls off with the squared distance alone";
     GLTF_OBJECT_LIGHTS "lights of a file in a `.toml` scene" "";
     GLTF_UNLIT_COLOR "vertex colours of unlit materials" "";
-    GLTF_SPECULAR_TEXTURE "textures of `KHR_materials_specular`" "the factors alone count";
+    GLTF_SPECULAR_TEXTURE "textures of `KHR_materials_specular`" "their means";
     GLTF_LOW_TRANSMISSION "transmission of less than half the light" "the surface is opaque";
     GLTF_TRANSMISSION_TEXTURE "texture of transmission" "a triangle is glass or opaque by its mean there";
     GLTF_GLASS_COLOR "base colour texture of glass" "its mean tints it";

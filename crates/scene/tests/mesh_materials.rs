@@ -107,6 +107,15 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
     assert!((coat_roughness - 0.25 * green).abs() < 1e-6 && green != red, "{coat_roughness}");
     assert!(warnings[0].contains("textures of `KHR_materials_clearcoat`"), "{warnings:?}");
     assert_eq!(specular_color, Vec3::new(2.0, 1.0, 1.0));
+    // Images of the dielectric's reflection count by their means.
+    let images = r#""specularTexture": {"index": 0}, "specularColorTexture": {"index": 0}, "#;
+    let pictured = material.replace(r#""specularFactor""#, &format!(r#"{images}"specularFactor""#));
+    let (pictured, warnings) = gltf_material(&folder, &pictured, &rest);
+    let MaterialKind::Principled(own) = pictured.kind else { panic!() };
+    assert!((own.specular - 0.5 * (255.0 + 128.0) / 510.0).abs() < 1e-6, "{}", own.specular);
+    let mean = Vec3::from(found.surface.color.as_ref().unwrap().mean());
+    assert!(close(own.specular_color, (mean * specular_color).into()), "{own:?}");
+    assert!(warnings[0].contains("textures of `KHR_materials_specular`"), "{warnings:?}");
     // The index 0 is an infinite one, of which the factors alone are left.
     let (mirror, _) = gltf_material(&folder, &material.replace("1.4", "0"), &rest);
     let MaterialKind::Principled(Principled { specular_color, .. }) = mirror.kind else { panic!() };

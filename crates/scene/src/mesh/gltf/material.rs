@@ -217,11 +217,15 @@ impl GltfReader<'_> {
     /// The model of the core format with `KHR_materials_ior` and `KHR_materials_specular`.
     fn metallic_roughness(&mut self, reading: &mut Reading) -> Result<Reflection> {
         let pbr = &reading.json["pbrMetallicRoughness"];
-        let specular = reading.extension("KHR_materials_specular");
-        let has_textures =
-            !specular["specularTexture"].is_null() || !specular["specularColorTexture"].is_null();
+        let model = &reading.json["extensions"]["KHR_materials_specular"];
+        let strength = self.texture(&model["specularTexture"], ALPHA, reading)?;
+        let tint = self.texture(&model["specularColorTexture"], COLOR, reading)?;
+        let mean = |texture: &Option<TextureUse>| match texture {
+            Some(texture) => Vec3::from(texture.mean()),
+            None => Vec3::ONE,
+        };
         let stated_ior = number(reading.extension("KHR_materials_ior"), "ior", DEFAULT_IOR);
-        let specular_color = Vec3::from_array(vector(specular, "specularColorFactor", [1.0; 3]));
+        let specular_color = Vec3::from_array(vector(model, "specularColorFactor", [1.0; 3]));
         // The index 0 stands for an infinite one: all light is reflected before the factors.
         let (ior, whole) = match stated_ior {
             0.0 => (DEFAULT_IOR, DIELECTRIC.recip()),
@@ -233,11 +237,11 @@ impl GltfReader<'_> {
             metallic: share(pbr, "metallicFactor", 1.0),
             roughness: share(pbr, "roughnessFactor", 1.0),
             ior,
-            specular: share(specular, "specularFactor", 1.0),
-            specular_color: whole * specular_color.max(Vec3::ZERO),
+            specular: share(model, "specularFactor", 1.0) * mean(&strength).x,
+            specular_color: whole * specular_color.max(Vec3::ZERO) * mean(&tint),
             ..Principled::default()
         });
-        reading.ignore_if(has_textures, features::GLTF_SPECULAR_TEXTURE);
+        reading.ignore_if(strength.or(tint).is_some(), features::GLTF_SPECULAR_TEXTURE);
         let packed = &pbr["metallicRoughnessTexture"];
         let mut surface = self.colored(&pbr["baseColorTexture"], reading)?;
         surface.roughness = self.texture(packed, GREEN, reading)?;
