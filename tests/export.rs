@@ -665,11 +665,25 @@ fn stretched_highlights_are_written() {
 }
 
 #[test]
-fn coats_go_to_gltf_alone() {
-    let clay = "type = \"principled\"\nbase_color = [0.5, 0.2, 0.1]\nroughness = 0.5\n\
-        coat_weight = 0.5\ncoat_roughness = 0.25";
-    let (folder, _, warnings, [ours, _]) = both(clay, "");
-    let is_named = |text: &String| text.contains("its coat is left out");
+fn coats_and_sheens_go_to_gltf_alone() {
+    for (cover, name, numbers) in [
+        ("coat_weight = 0.5\ncoat_roughness = 0.25", "coat", vec![0.5, 0.25]),
+        (
+            "sheen_color = [0.5, 0.25, 0]\nsheen_roughness = 0.75",
+            "sheen",
+            vec![0.5, 0.25, 0.0, 0.75],
+        ),
+    ] {
+        goes_to_gltf_alone(cover, name, &numbers);
+    }
+}
+
+fn goes_to_gltf_alone(cover: &str, name: &str, expected: &[f32]) {
+    let clay =
+        format!("type = \"principled\"\nbase_color = [0.5, 0.2, 0.1]\nroughness = 0.5\n{cover}");
+    let (folder, _, warnings, [ours, _]) = both(&clay, "");
+    let named = format!("its {name} is left out");
+    let is_named = |text: &String| text.contains(&named);
     assert!(warnings.iter().any(is_named), "{warnings:?}");
     assert!(
         pbrt::export(&ours, &folder.path().join("out.pbrt"), SETTINGS)
@@ -683,5 +697,5 @@ fn coats_go_to_gltf_alone() {
     exported.write().unwrap();
     let numbers = |scene: &Scene| scene.materials[0].kind.parameters().2;
     assert_eq!(numbers(&Scene::load(&path).unwrap()), numbers(&ours));
-    assert_eq!(numbers(&ours)[2], [0.5, 0.25]);
+    assert_eq!(numbers(&ours)[2], expected);
 }

@@ -37,11 +37,11 @@ fn load(name: &str, text: &str) -> Scene {
 fn everything_that_a_gltf_file_loses_is_named_once() {
     let materials = r#"{"name": "wood", "alphaMode": "MASK", "emissiveFactor": [1, 0, 0],
             "normalTexture": {"index": 0}, "occlusionTexture": {"index": 0},
-            "extensions": {"KHR_materials_sheen": {"sheenColorFactor": [1, 0, 0]},
+            "extensions": {"KHR_materials_iridescence": {"iridescenceFactor": 1},
                 "KHR_materials_transmission": {"transmissionFactor": 0.4}, "NEW_one": {}},
             "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": {"index": 0,
                 "extensions": {"KHR_texture_transform": {"texCoord": 2}}}}},
-           {"name": "not used", "extensions": {"KHR_materials_sheen": {}}}"#;
+           {"name": "not used", "extensions": {"KHR_materials_iridescence": {}}}"#;
     let nodes = r#"{"mesh": 0, "children": [1, 2], "skin": 0},
         {"name": "lamp", "extensions": {"KHR_lights_punctual": {"light": 0}}}, {"mesh": 0}"#;
     let rest = r#", "extensionsRequired": ["KHR_materials_unlit"],
@@ -61,7 +61,8 @@ fn everything_that_a_gltf_file_loses_is_named_once() {
         "ignored third and further sets of texture coordinates (mesh `sail`)",
         "ignored range of lights (node `lamp`): light falls off with the squared distance alone",
         "ignored textures without an image (2, first in material `wood`)",
-        "ignored `KHR_materials_sheen` (material `wood`): without the bright rim of cloth",
+        "ignored `KHR_materials_iridescence` (material `wood`): reflections without the colours of thin \
+         films",
         "ignored transmission of less than half the light (material `wood`): the surface is opaque",
         "ignored extension `NEW_one` (material `wood`)",
     ];

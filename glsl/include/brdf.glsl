@@ -10,6 +10,7 @@
 #include "fresnel.glsl"
 #include "ggx.glsl"
 #include "layout.glsl"
+#include "sheen.glsl"
 #include "surfaces.glsl"
 
 // Reflectance of a coat at normal incidence, of refractive index 1.5. Twin: src/brdf/value.rs.
@@ -31,9 +32,14 @@ bool is_diffuse(Material material) {
     return is_kind(material, MATERIAL_DIFFUSE) || is_kind(material, MATERIAL_DIFFUSE_TRANSMISSION);
 }
 
-// Tests for a metallic-roughness material, with or without a coat.
+// Tests for a metallic-roughness material below a coat or a sheen.
+bool is_covered(Material material) {
+    return is_kind(material, MATERIAL_COATED) || is_kind(material, MATERIAL_SHEEN);
+}
+
+// Tests for a metallic-roughness material, covered or not.
 bool is_principled(Material material) {
-    return is_kind(material, MATERIAL_PRINCIPLED) || is_kind(material, MATERIAL_COATED);
+    return is_kind(material, MATERIAL_PRINCIPLED) || is_covered(material);
 }
 
 // Word of the BRDF table as a float.
@@ -96,12 +102,20 @@ float principled_specular_share(Material material, float cosine) {
     return sum > 0.0 ? specular / sum : 0.5;
 }
 
-// Probability of sampling the coat of a principled material.
-float coat_share(Material material, float cosine) {
+// Light of a uniform white hemisphere that what covers a principled material reflects.
+vec3 cover_albedo(Material material, float cosine) {
+    return cosine_table(material.cover_table, 1u, cosine) / largest_of(material.cover)
+        * material.cover;
+}
+
+// Probability of sampling what covers a principled material.
+float cover_share(Material material, float cosine) {
     PrincipledAlbedo albedo = principled_albedo(material, cosine);
-    float coat = cosine_table(material.coat_table, 1u, cosine);
-    float base = (1.0 - coat) * dot(albedo.specular + albedo.diffuse, LUMINANCE_WEIGHTS);
-    return coat / (coat + base);
+    vec3 covering = cover_albedo(material, cosine);
+    float base = (1.0 - largest_of(covering))
+        * dot(albedo.specular + albedo.diffuse, LUMINANCE_WEIGHTS);
+    float above = dot(covering, LUMINANCE_WEIGHTS);
+    return above / (above + base);
 }
 
 // Metal and dielectric in one: `reflection` is that of GGX at unit reflectance. glTF 2.0, appendix B.
@@ -199,8 +213,8 @@ struct Reflector {
     vec3 outgoing_local;
     // Probability of sampling the specular part; of a measured material, the cosine lobe.
     float share;
-    // Probability of sampling the coat of a principled material; `share` is that of the rest.
-    float coat_share;
+    // Probability of sampling what covers a principled material; `share` is that of the rest.
+    float cover_share;
     // Light that enters the base of a plastic, or what a coat covers, from the outgoing direction.
     float transmission;
     // ggx_stretched_length and ggx_cap_factor of the outgoing direction.
@@ -234,10 +248,10 @@ Reflector reflector_from(Material material, vec3 outgoing_local) {
     if (is_principled(material)) {
         reflector.share = principled_specular_share(material, outgoing_local.z);
     }
-    if (is_kind(material, MATERIAL_COATED)) {
+    if (is_covered(material)) {
         reflector.transmission = cosine_table(
-            material.coat_table + COAT_TRANSMISSION_OFFSET, 1u, outgoing_local.z);
-        reflector.coat_share = coat_share(material, outgoing_local.z);
+            material.cover_table + COAT_TRANSMISSION_OFFSET, 1u, outgoing_local.z);
+        reflector.cover_share = cover_share(material, outgoing_local.z);
     }
     if (is_kind(material, MATERIAL_MEASURED)) {
         reflector.elevation = measured_elevation_bin(outgoing_local);
@@ -310,24 +324,31 @@ vec3 measured_sample(Reflector reflector, vec3 u) {
     return 2.0 * dot(outgoing_local, half_vector) * half_vector - outgoing_local;
 }
 
-// Adds the coat to value and density of a principled material. Light between both is as that of
+// Adds a coat or a sheen to value and density of a principled material. Light between both is as that of
 // a plastic's coat and diffuse base [Kelemen & Szirmay-Kalos 2001].
 void cover(
     Reflector reflector, vec3 incident_local, vec3 half_vector, float cosine_difference,
     inout vec3 value, inout float pdf) {
     Material material = reflector.material;
     vec3 outgoing_local = reflector.outgoing_local;
-    GgxWidth width = round_width(material.coat_alpha);
-    float stretched = ggx_stretched_length(outgoing_local, width);
-    float reflection =
-        ggx_reflection(half_vector, outgoing_local, stretched, incident_local, width);
-    float fresnel = mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine_difference));
+    float covering;
+    float cover_pdf;
+    if (is_kind(material, MATERIAL_SHEEN)) {
+        covering = sheen_value(
+            half_vector, outgoing_local.z, incident_local.z, material.cover_alpha);
+        cover_pdf = 0.5 / PI;
+    } else {
+        GgxWidth width = round_width(material.cover_alpha);
+        float stretched = ggx_stretched_length(outgoing_local, width);
+        covering = mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine_difference))
+            * ggx_reflection(half_vector, outgoing_local, stretched, incident_local, width);
+        cover_pdf = ggx_pdf(
+            half_vector, outgoing_local, stretched, ggx_cap_factor(outgoing_local, width), width);
+    }
     float base = reflector.transmission
-        * cosine_table(material.coat_table + COAT_TRANSMISSION_OFFSET, 1u, incident_local.z);
-    value = base * value + vec3(material.coat_weight * fresnel * reflection);
-    float coat_pdf = ggx_pdf(
-        half_vector, outgoing_local, stretched, ggx_cap_factor(outgoing_local, width), width);
-    pdf = mix(pdf, coat_pdf, reflector.coat_share);
+        * cosine_table(material.cover_table + COAT_TRANSMISSION_OFFSET, 1u, incident_local.z);
+    value = base * value + covering * material.cover;
+    pdf = mix(pdf, cover_pdf, reflector.cover_share);
 }
 
 // Value (1/sr, without the cosine) and density of brdf_sample at one pair of directions. The density
@@ -369,7 +390,7 @@ void brdf_evaluate_and_pdf(
     } else if (is_principled(material)) {
         value = principled_value(material, reflection, cosine_difference);
         pdf = mix(cosine_pdf, pdf, reflector.share);
-        if (is_kind(material, MATERIAL_COATED)) {
+        if (is_covered(material)) {
             cover(reflector, incident_local, half_vector, cosine_difference, value, pdf);
         }
     } else if (is_kind(material, MATERIAL_CONDUCTOR) && material.ior > 0.0) {
@@ -403,13 +424,16 @@ vec3 brdf_sample(Reflector reflector, vec3 u) {
         return measured_sample(reflector, u);
     }
     float share = reflector.share;
-    if (is_kind(material, MATERIAL_COATED)) {
-        if (u.x < reflector.coat_share) {
-            GgxWidth width = round_width(material.coat_alpha);
+    if (is_covered(material)) {
+        if (u.x < reflector.cover_share) {
+            if (is_kind(material, MATERIAL_SHEEN)) {
+                return sample_hemisphere(u.yz);
+            }
+            GgxWidth width = round_width(material.cover_alpha);
             float cap_factor = ggx_cap_factor(reflector.outgoing_local, width);
             return ggx_sample(reflector.outgoing_local, width, cap_factor, u.yz);
         }
-        share = mix(share, 1.0, reflector.coat_share);
+        share = mix(share, 1.0, reflector.cover_share);
     }
     if (u.x < share) {
         return ggx_sample(
@@ -435,15 +459,16 @@ vec3 brdf_albedo(Material material, vec3 outgoing_local) {
     }
     if (is_principled(material)) {
         PrincipledAlbedo albedo = principled_albedo(material, outgoing_local.z);
-        if (is_kind(material, MATERIAL_COATED)) {
-            float coat = cosine_table(material.coat_table, 1u, outgoing_local.z);
+        if (is_covered(material)) {
+            vec3 covering = cover_albedo(material, outgoing_local.z);
+            float rest = 1.0 - largest_of(covering);
             float transmission = cosine_table(
-                material.coat_table + COAT_TRANSMISSION_OFFSET, 1u, outgoing_local.z);
+                material.cover_table + COAT_TRANSMISSION_OFFSET, 1u, outgoing_local.z);
             // Smooth surfaces send on light of the same elevation, rough ones of all.
             float spread = material.alpha / (material.alpha + 0.05);
-            albedo.specular *= mix(transmission * transmission, 1.0 - coat, spread);
-            albedo.specular += vec3(coat);
-            albedo.diffuse *= 1.0 - coat;
+            albedo.specular *= mix(transmission * transmission, rest, spread);
+            albedo.specular += covering;
+            albedo.diffuse *= rest;
         }
         return min(albedo.specular + albedo.diffuse, vec3(1.0));
     }

@@ -22,7 +22,8 @@ bool is_specular(uint kind) {
 
 // Material as the textures at a place vary it.
 Material varied(Material material, Surface surface) {
-    bool is_principled = material.kind == MATERIAL_PRINCIPLED || material.kind == MATERIAL_COATED;
+    bool is_principled = material.kind == MATERIAL_PRINCIPLED || material.kind == MATERIAL_COATED
+        || material.kind == MATERIAL_SHEEN;
     material.reflectance = surface.reflectance;
     material.alpha = surface.alpha;
     material.anisotropy = surface.anisotropy;

@@ -1,13 +1,13 @@
 //! Tables over the cosine between a direction and the normal: directional albedos of GGX surfaces, and
 //! what the sampling of plastics and principled materials derives from them.
 
-use std::sync::LazyLock;
+use std::{f32::consts::PI, sync::LazyLock};
 
 use glam::{Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;
 
 use crate::{
-    brdf::{fresnel::*, ggx::*, value::COAT_REFLECTANCE},
+    brdf::{fresnel::*, ggx::*, sheen::*, value::COAT_REFLECTANCE},
     math::colour::luminance,
     scene::measured::lookup::{mix, sample_cosine_hemisphere},
     shader::constants::*,
@@ -15,6 +15,8 @@ use crate::{
 
 /// Points per dimension of the quadrature for one material.
 const FINE_POINTS: u32 = 64;
+/// The same for a sheen, whose rim is narrow in azimuth too.
+const SHEEN_POINTS: u32 = 256;
 /// Points per dimension of the quadrature for the table that materials share.
 const COARSE_POINTS: u32 = 32;
 
@@ -51,11 +53,10 @@ fn ggx_albedo(outgoing: Vec3, alpha: f32, points: u32, fresnel: impl Fn(f32) -> 
     (sum / f64::from(points * points)).as_vec3()
 }
 
-/// Tables of a coat that covers the share `weight` of a surface: directional albedo E, and transmission into
-/// and out of what it covers, T² = (1 − E)²/(1 − Ē).
-fn coat_tables(weight: f32, alpha: f32, fresnel: impl Fn(f32) -> f32 + Sync) -> [Vec<f32>; 2] {
-    let fresnel = |cosine| Vec3::splat(fresnel(cosine));
-    let coat_albedo = |direction| ggx_albedo(direction, alpha, FINE_POINTS, fresnel).x.min(1.0);
+/// Tables of a cover of the share `weight` of a surface: its directional albedo E, and transmission into and
+/// out of what it covers, T² = (1 − E)²/(1 − Ē).
+fn cover_tables(weight: f32, albedo: impl Fn(Vec3) -> f32 + Sync) -> [Vec<f32>; 2] {
+    let coat_albedo = |direction| albedo(direction).min(1.0);
     let mut coat: Vec<f32> = (0..BRDF_COSINE_NODES)
         .into_par_iter()
         .map(|node| coat_albedo(direction_at(node as f32)))
@@ -90,7 +91,9 @@ fn coat_tables(weight: f32, alpha: f32, fresnel: impl Fn(f32) -> f32 + Sync) -> 
 /// Words of a plastic: directional albedo of the coat, transmission into and out of the base,
 /// probability of sampling the coat; see `COAT_TRANSMISSION_OFFSET` and `PLASTIC_SPECULAR_SHARE_OFFSET`.
 pub(crate) fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
-    let [coat, transmission] = coat_tables(1.0, alpha, |cosine| fresnel_dielectric(cosine, ior));
+    let fresnel = |cosine| Vec3::splat(fresnel_dielectric(cosine, ior));
+    let [coat, transmission] =
+        cover_tables(1.0, |direction| ggx_albedo(direction, alpha, FINE_POINTS, fresnel).x);
     let specular_share = coat.iter().map(|&e| {
         let base = luminance(diffuse) * (1.0 - e);
         if e + base > 0.0 { e / (e + base) } else { 0.5 }
@@ -100,8 +103,21 @@ pub(crate) fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
 
 /// Words of the coat of a principled material: the first two tables of a plastic.
 pub(crate) fn coat_words(weight: f32, alpha: f32) -> Vec<u32> {
-    let fresnel = |cosine| mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine));
-    coat_tables(weight, alpha, fresnel).concat().into_iter().map(f32::to_bits).collect()
+    let fresnel = |cosine| Vec3::splat(mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine)));
+    let albedo = |direction| ggx_albedo(direction, alpha, FINE_POINTS, fresnel).x;
+    cover_tables(weight, albedo).concat().into_iter().map(f32::to_bits).collect()
+}
+
+/// Words of a sheen whose largest channel is `strength`, likewise; sums over the hemisphere are by midpoints.
+pub(crate) fn sheen_words(strength: f32, alpha: f32) -> Vec<u32> {
+    let albedo = |outgoing: Vec3| {
+        let light = |u| {
+            let incident = sample_hemisphere(u);
+            incident.z * sheen_value(outgoing + incident, outgoing.z, incident.z, alpha)
+        };
+        2.0 * PI * grid(SHEEN_POINTS).map(light).sum::<f32>() / (SHEEN_POINTS * SHEEN_POINTS) as f32
+    };
+    cover_tables(strength, albedo).concat().into_iter().map(f32::to_bits).collect()
 }
 
 /// Words of a conductor with exact Fresnel: directional albedo.

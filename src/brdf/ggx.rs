@@ -11,8 +11,8 @@ use crate::shader::structs::Material;
 pub(crate) const SMALLEST_ALPHA: f32 = 1e-3;
 
 /// Width of GGX by direction: a circle of radius `alpha`, stretched by the matrix I + M of M = (p, q; q, −p),
-/// (p, q) = `anisotropy`. The widths are alpha (1 ± |anisotropy|), the larger at half the angle of (p, q) from
-/// the x axis.
+/// (p, q) = `anisotropy`. The widths are alpha (1 ± |anisotropy|), the larger at half the angle of (p, q)
+/// from the x axis.
 #[derive(Clone, Copy, Debug)]
 pub struct GgxWidth {
     /// Mean of the two widths α.

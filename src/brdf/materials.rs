@@ -6,8 +6,9 @@ use glam::{Vec2, Vec3};
 
 use crate::{
     brdf::{
-        albedo::{GGX_WORDS, coat_words, conductor_words, ggx_words, plastic_words},
+        albedo::{GGX_WORDS, coat_words, conductor_words, ggx_words, plastic_words, sheen_words},
         ggx::SMALLEST_ALPHA,
+        sheen::SMALLEST_SHEEN_ALPHA,
     },
     error::{Error, Result},
     math::colour::luminance,
@@ -107,11 +108,19 @@ impl MaterialTables {
                     converted.table_offset = ggx_table(&mut tables);
                     if own.coat_weight > 0.0 {
                         converted.kind = MATERIAL_COATED;
-                        converted.coat_weight = own.coat_weight;
-                        converted.coat_alpha =
+                        converted.cover = [own.coat_weight; 3];
+                        converted.cover_alpha =
                             (own.coat_roughness * own.coat_roughness).max(SMALLEST_ALPHA);
-                        let words = coat_words(own.coat_weight, converted.coat_alpha);
-                        converted.coat_table = tables.append(&words);
+                        let words = coat_words(own.coat_weight, converted.cover_alpha);
+                        converted.cover_table = tables.append(&words);
+                    } else if own.sheen_color != Vec3::ZERO {
+                        converted.kind = MATERIAL_SHEEN;
+                        converted.cover = own.sheen_color.to_array();
+                        let alpha = own.sheen_roughness * own.sheen_roughness;
+                        converted.cover_alpha = alpha.max(SMALLEST_SHEEN_ALPHA);
+                        let strength = own.sheen_color.max_element();
+                        let words = sheen_words(strength, converted.cover_alpha);
+                        converted.cover_table = tables.append(&words);
                     }
                 }
                 MaterialKind::Mirror { reflectance } => {

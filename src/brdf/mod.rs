@@ -14,6 +14,7 @@
 //! | conductor | GGX, exact conductor Fresnel or Schlick's | visible normals |
 //! | principled | GGX with Schlick's reflectance, over (1−metallic)·(1−F)·ρ/π | visible normals or cosine, by albedo |
 //! | coated | GGX coat with Schlick's reflectance, over principled·T(θ_o)·T(θ_i) | visible normals of either or cosine, by albedo |
+//! | sheen | Charlie's sheen, over principled·T(θ_o)·T(θ_i) | uniform, visible normals or cosine, by albedo |
 //! | measured | trilinear on the half/difference grid | tabulated half vectors or cosine |
 //!
 //! E(θ) is the directional albedo of the coat and Ē its cosine-weighted mean. Coat and base
@@ -28,6 +29,7 @@ pub mod fresnel;
 pub mod ggx;
 pub mod materials;
 pub mod sanity;
+pub mod sheen;
 mod value;
 
 use glam::Vec3;

@@ -7,7 +7,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use crate::{
-    brdf::{fresnel::*, ggx::*},
+    brdf::{fresnel::*, ggx::*, sheen::sheen_value},
     scene::{
         coat::DIELECTRIC,
         measured::lookup::{cosine_table, half_difference_angles, measured_value, mix},
@@ -74,7 +74,7 @@ pub fn brdf_evaluate(
     let cosine_difference = (0.5 * half_vector.length()).min(1.0);
     let reflection =
         ggx_reflection(half_vector, outgoing_local, incident_local, GgxWidth::of(material));
-    // Light that a coat lets in and out.
+    // Light that a cover lets in and out.
     let through = |table: u32| {
         let at = |cosine| cosine_table(brdf_table, table + COAT_TRANSMISSION_OFFSET, 1, cosine);
         at(outgoing_local.z) * at(incident_local.z)
@@ -86,12 +86,17 @@ pub fn brdf_evaluate(
             Vec3::splat(coat) + base * reflectance
         }
         MATERIAL_PRINCIPLED => principled_value(material, reflection, cosine_difference),
-        MATERIAL_COATED => {
-            let width = GgxWidth::round(material.coat_alpha);
-            let coat = ggx_reflection(half_vector, outgoing_local, incident_local, width);
-            let fresnel = mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine_difference));
+        MATERIAL_COATED | MATERIAL_SHEEN => {
+            let alpha = material.cover_alpha;
+            let covering = if material.kind == MATERIAL_SHEEN {
+                sheen_value(half_vector, outgoing_local.z, incident_local.z, alpha)
+            } else {
+                let width = GgxWidth::round(alpha);
+                mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine_difference))
+                    * ggx_reflection(half_vector, outgoing_local, incident_local, width)
+            };
             let base = principled_value(material, reflection, cosine_difference);
-            through(material.coat_table) * base + Vec3::splat(material.coat_weight * fresnel * coat)
+            through(material.cover_table) * base + covering * Vec3::from(material.cover)
         }
         MATERIAL_CONDUCTOR if material.ior > 0.0 => {
             let (eta, k) = (Vec3::from(material.eta), Vec3::from(material.k));

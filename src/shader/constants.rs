@@ -238,6 +238,8 @@ constants! {
     MATERIAL_DIFFUSE_TRANSMISSION = 8;
     /// Metallic-roughness material below a clear coat.
     MATERIAL_COATED = 9;
+    /// Metallic-roughness material below a sheen.
+    MATERIAL_SHEEN = 10;
     /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
     SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
 

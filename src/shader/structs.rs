@@ -408,16 +408,14 @@ structs! {
         /// Extinction coefficient of a conductor, absorption per metre inside a dielectric, or reflectance
         /// of a principled dielectric at grazing incidence.
         k: vec3,
-        /// Share of a principled material that a coat covers.
-        coat_weight: float,
-        /// GGX width α of the coat.
-        coat_alpha: float,
-        /// First word of the coat's own table in the BRDF table buffer.
-        coat_table: uint,
+        /// Share of a principled material that a coat covers, in all channels, or colour of its sheen.
+        cover: vec3,
+        /// Width α of the coat or the sheen.
+        cover_alpha: float,
+        /// First word of the table of coat or sheen in the BRDF table buffer.
+        cover_table: uint,
         /// Stretch of the widths of GGX, as `GgxWidth` has it; then `alpha` is their mean.
         anisotropy: vec2,
-        /// Zero; pads the last of five texels of four words.
-        reserved: vec2,
     }
 
     /// Texture as a property of a material reads it: value = scale · texel + bias.

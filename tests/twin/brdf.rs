@@ -4,7 +4,7 @@
 use std::f32::consts::PI;
 
 use fenestra::{
-    brdf::{MaterialTables, brdf_evaluate, ggx::*, of_side},
+    brdf::{MaterialTables, brdf_evaluate, ggx::*, of_side, sheen::sample_hemisphere},
     math::colour::luminance,
     scene::measured::lookup::{
         cosine_table, half_difference_angles, measured_pdf, measured_sample, mix,
@@ -94,12 +94,18 @@ fn principled_specular_share(brdf_table: &[u32], material: &Material, cosine: f3
     if sum > 0.0 { specular / sum } else { 0.5 }
 }
 
-/// Probability of sampling the coat of a principled material.
-fn coat_share(brdf_table: &[u32], material: &Material, cosine: f32) -> f32 {
+/// Light of a uniform white hemisphere that what covers a principled material reflects.
+fn cover_albedo(brdf_table: &[u32], material: &Material, cosine: f32) -> Vec3 {
+    let cover = Vec3::from(material.cover);
+    cosine_table(brdf_table, material.cover_table, 1, cosine) / cover.max_element() * cover
+}
+
+/// Probability of sampling what covers a principled material.
+fn cover_share(brdf_table: &[u32], material: &Material, cosine: f32) -> f32 {
     let albedo = principled_albedo(brdf_table, material, cosine);
-    let coat = cosine_table(brdf_table, material.coat_table, 1, cosine);
-    let base = (1.0 - coat) * luminance(albedo.specular + albedo.diffuse);
-    coat / (coat + base)
+    let covering = cover_albedo(brdf_table, material, cosine);
+    let base = (1.0 - covering.max_element()) * luminance(albedo.specular + albedo.diffuse);
+    luminance(covering) / (luminance(covering) + base)
 }
 
 /// Value (1/sr, without the cosine) and density of [`brdf_sample`] at one pair of directions.
@@ -127,23 +133,26 @@ pub fn brdf_evaluate_and_pdf(
             let theta_half = half_difference_angles(outgoing_local, incident_local).x;
             measured_pdf(brdf_table, offset, outgoing_local, incident_local, theta_half)
         }
-        MATERIAL_PLASTIC | MATERIAL_PRINCIPLED | MATERIAL_COATED => {
+        MATERIAL_PLASTIC | MATERIAL_PRINCIPLED | MATERIAL_COATED | MATERIAL_SHEEN => {
             let share = specular_share(brdf_table, material, outgoing_local.z);
             mix(cosine_pdf, specular_pdf(), share)
         }
         MATERIAL_CONDUCTOR => specular_pdf(),
         _ => 0.0,
     };
-    if material.kind == MATERIAL_COATED {
-        let coat_pdf = ggx_pdf(half_vector, outgoing_local, GgxWidth::round(material.coat_alpha));
-        return (value, mix(pdf, coat_pdf, coat_share(brdf_table, material, outgoing_local.z)));
-    }
-    (value, pdf)
+    let cover_pdf = match material.kind {
+        MATERIAL_COATED => {
+            ggx_pdf(half_vector, outgoing_local, GgxWidth::round(material.cover_alpha))
+        }
+        MATERIAL_SHEEN => 0.5 / PI,
+        _ => return (value, pdf),
+    };
+    (value, mix(pdf, cover_pdf, cover_share(brdf_table, material, outgoing_local.z)))
 }
 
 /// Probability of sampling the specular part of a material that has another.
 fn specular_share(brdf_table: &[u32], material: &Material, cosine: f32) -> f32 {
-    if matches!(material.kind, MATERIAL_PRINCIPLED | MATERIAL_COATED) {
+    if matches!(material.kind, MATERIAL_PRINCIPLED | MATERIAL_COATED | MATERIAL_SHEEN) {
         return principled_specular_share(brdf_table, material, cosine);
     }
     let offset = material.table_offset + PLASTIC_SPECULAR_SHARE_OFFSET;
@@ -169,21 +178,21 @@ pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
         }
         MATERIAL_DIFFUSE | MATERIAL_DIFFUSE_TRANSMISSION => 0.0,
         MATERIAL_CONDUCTOR => 1.0,
-        MATERIAL_PLASTIC | MATERIAL_PRINCIPLED | MATERIAL_COATED => {
+        MATERIAL_PLASTIC | MATERIAL_PRINCIPLED | MATERIAL_COATED | MATERIAL_SHEEN => {
             specular_share(brdf_table, material, outgoing_local.z)
         }
         kind => panic!("material of the unknown kind {kind}"),
     };
-    if material.kind == MATERIAL_COATED {
-        let coat_share = coat_share(brdf_table, material, outgoing_local.z);
-        if u.x < coat_share {
-            return ggx_sample(
-                outgoing_local,
-                GgxWidth::round(material.coat_alpha),
-                vec2(u.y, u.z),
-            );
+    if matches!(material.kind, MATERIAL_COATED | MATERIAL_SHEEN) {
+        let cover_share = cover_share(brdf_table, material, outgoing_local.z);
+        if u.x < cover_share && material.kind == MATERIAL_SHEEN {
+            return sample_hemisphere(vec2(u.y, u.z));
         }
-        specular_share = mix(specular_share, 1.0, coat_share);
+        if u.x < cover_share {
+            let width = GgxWidth::round(material.cover_alpha);
+            return ggx_sample(outgoing_local, width, vec2(u.y, u.z));
+        }
+        specular_share = mix(specular_share, 1.0, cover_share);
     }
     if u.x < specular_share {
         return ggx_sample(outgoing_local, GgxWidth::of(material), vec2(u.y, u.z));
@@ -210,17 +219,17 @@ pub fn brdf_albedo(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
             let coat = cosine_table(brdf_table, offset, 1, cosine);
             Vec3::splat(coat) + (1.0 - coat) * reflectance
         }
-        MATERIAL_PRINCIPLED | MATERIAL_COATED => {
+        MATERIAL_PRINCIPLED | MATERIAL_COATED | MATERIAL_SHEEN => {
             let mut albedo = principled_albedo(brdf_table, material, cosine);
-            if material.kind == MATERIAL_COATED {
-                let table = material.coat_table;
-                let coat = cosine_table(brdf_table, table, 1, cosine);
-                let transmission =
-                    cosine_table(brdf_table, table + COAT_TRANSMISSION_OFFSET, 1, cosine);
+            if material.kind != MATERIAL_PRINCIPLED {
+                let covering = cover_albedo(brdf_table, material, cosine);
+                let rest = 1.0 - covering.max_element();
+                let table = material.cover_table + COAT_TRANSMISSION_OFFSET;
+                let transmission = cosine_table(brdf_table, table, 1, cosine);
                 let spread = material.alpha / (material.alpha + 0.05);
-                albedo.specular *= mix(transmission * transmission, 1.0 - coat, spread);
-                albedo.specular += coat;
-                albedo.diffuse *= 1.0 - coat;
+                albedo.specular *= mix(transmission * transmission, rest, spread);
+                albedo.specular += covering;
+                albedo.diffuse *= rest;
             }
             (albedo.specular + albedo.diffuse).min(Vec3::ONE)
         }

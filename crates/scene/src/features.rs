@@ -51,7 +51,8 @@ features! {
     GLTF_SHEET "gloss, metal, volume and own pattern of `KHR_materials_diffuse_transmission`" "left out";
     GLTF_CLEARCOAT "coat on glass or a sheet" "left out";
     GLTF_CLEARCOAT_TEXTURE "textures of `KHR_materials_clearcoat`" "their means; normals as below the coat";
-    GLTF_SHEEN "`KHR_materials_sheen`" "without the bright rim of cloth";
+    GLTF_SHEEN "sheen below a coat, of glass or a sheet" "left out";
+    GLTF_SHEEN_TEXTURE "textures of `KHR_materials_sheen`" "their means";
     GLTF_IRIDESCENCE "`KHR_materials_iridescence`" "reflections without the colours of thin films";
     GLTF_ANISOTROPY "anisotropy of glass or a sheet" "left out";
     GLTF_DISPERSION "`KHR_materials_dispersion`" "glass does not part colours";
@@ -190,7 +191,7 @@ features! {
 }
 
 /// Extensions of glTF that are read.
-pub const GLTF_EXTENSIONS: [&str; 18] = [
+pub const GLTF_EXTENSIONS: [&str; 19] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
@@ -202,6 +203,7 @@ pub const GLTF_EXTENSIONS: [&str; 18] = [
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",

@@ -241,6 +241,8 @@ impl MaterialKind {
                 let coat = vec![own.coat_weight, own.coat_roughness];
                 let mut groups = vec![colors(&[&own.base_color, &own.specular_color]), numbers];
                 groups.extend((own.coat_weight > 0.0).then_some(coat));
+                let sheen = [&own.sheen_color.to_array()[..], &[own.sheen_roughness]].concat();
+                groups.extend((own.sheen_color != Vec3::ZERO).then_some(sheen));
                 ("principled", 5, groups)
             }
             Self::Mirror { reflectance } => ("mirror", 6, vec![colors(&[reflectance])]),
@@ -307,8 +309,8 @@ impl MaterialKind {
 }
 
 /// Metallic-roughness material of glTF 2.0, appendix B, with `KHR_materials_ior`,
-/// `KHR_materials_specular` and `KHR_materials_clearcoat`; by default the white metal that glTF takes where a
-/// file states nothing.
+/// `KHR_materials_specular`, `KHR_materials_clearcoat` and `KHR_materials_sheen`; by default the white metal
+/// that glTF takes where a file states nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Principled {
     /// Albedo of the dielectric's base, and reflectance of the metal at normal incidence, 0…1.
@@ -330,6 +332,12 @@ pub struct Principled {
     pub coat_weight: f32,
     /// Roughness √α of the coat, 0…1.
     pub coat_roughness: f32,
+    /// Colour of a rim as cloth has it, by `KHR_materials_sheen`, 0…1; not below a coat.
+    ///
+    /// Deviation: what it covers is dimmed as below a coat.
+    pub sheen_color: Vec3,
+    /// Roughness √α of the sheen, 0…1; at least 0.1 is rendered.
+    pub sheen_roughness: f32,
 }
 
 impl Principled {
@@ -353,6 +361,8 @@ impl Default for Principled {
             specular_color,
             coat_weight: 0.0,
             coat_roughness: 0.0,
+            sheen_color: Vec3::ZERO,
+            sheen_roughness: 0.0,
         }
     }
 }

@@ -80,13 +80,15 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
         specular_color,
         coat_weight,
         coat_roughness,
+        sheen_color,
+        sheen_roughness: _,
     }) = found.kind
     else {
         panic!("{found:?}")
     };
     assert_eq!((base_color, metallic), (Vec3::new(0.8, 0.6, 0.4), 0.25));
     assert_eq!((roughness, ior, specular), (0.5, 1.4, 0.5));
-    assert_eq!((coat_weight, coat_roughness), (0.5, 0.25));
+    assert_eq!((coat_weight, coat_roughness, sheen_color), (0.5, 0.25, Vec3::ZERO));
     let Anisotropy { strength, rotation, direction } = &found.surface.anisotropy;
     let direction = direction.as_ref().unwrap();
     assert_eq!((*strength, *rotation), (0.75, 0.5));
@@ -851,11 +853,45 @@ fn what_the_format_leaves_open_is_completed() {
     assert!(triangle(&hidden));
     assert!(hidden.warnings.iter().all(|text| !text.contains("ignored")), "{:?}", hidden.warnings);
     let idle = r#"{"extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 0},
-        "KHR_materials_sheen": {"sheenColorFactor": [0, 0, 0]}, "KHR_materials_dispersion": {}}}"#;
+        "KHR_materials_iridescence": {"iridescenceFactor": 0}, "KHR_materials_dispersion": {}}}"#;
     let (_, warnings) = gltf_material(&folder, idle, "");
     assert!(warnings.iter().all(|text| !text.contains("ignored")), "{warnings:?}");
-    let (_, warnings) = gltf_material(&folder, &idle.replace("[0, 0, 0]", "[0.5, 0, 0]"), "");
-    assert!(warnings[0].contains("KHR_materials_sheen"), "{warnings:?}");
+    let (_, warnings) = gltf_material(
+        &folder,
+        &idle.replace("iridescenceFactor\": 0", "iridescenceFactor\": 1"),
+        "",
+    );
+    assert!(warnings[0].contains("KHR_materials_iridescence"), "{warnings:?}");
+}
+
+#[test]
+fn cloth_has_a_sheen() {
+    let folder = Folder::new();
+    folder.write("a.png", png([[10, 20, 30, 255], [40, 50, 60, 128]]));
+    let rest = r#", "images": [{"uri": "a.png"}], "textures": [{"source": 0}]"#;
+    let sheen = r#""KHR_materials_sheen": {"sheenColorFactor": [0.5, 0.25, 0],
+        "sheenRoughnessFactor": 0.5"#;
+    let of = |more: &str| {
+        let text = format!(r#"{{"extensions": {{{sheen}{more}}}}}"#);
+        let (material, warnings) = gltf_material(&folder, &text, rest);
+        let MaterialKind::Principled(own) = material.kind else { panic!() };
+        (own.sheen_color, own.sheen_roughness, warnings)
+    };
+    assert_eq!(of("}"), (Vec3::new(0.5, 0.25, 0.0), 0.5, vec![]));
+    let (_, roughness, warnings) = of(r#", "sheenRoughnessTexture": {"index": 0}}"#);
+    assert!((roughness - 0.5 * 383.0 / 510.0).abs() < 1e-6, "{roughness}");
+    assert!(warnings[0].contains("textures of `KHR_materials_sheen`"), "{warnings:?}");
+    let (color, ..) = of(r#", "sheenColorTexture": {"index": 0}}"#);
+    let linear = |byte: f32| ((byte / 255.0 + 0.055) / 1.055).powf(2.4);
+    assert!((color.y - 0.125 * (linear(20.0) + linear(50.0))).abs() < 1e-5, "{color}");
+    let (color, _, warnings) = of(r#"}, "KHR_materials_clearcoat": {"clearcoatFactor": 1}"#);
+    assert_eq!(color, Vec3::ZERO);
+    assert!(warnings[0].contains("sheen below a coat"), "{warnings:?}");
+    let kind = |keys: &str| mtl_material(&folder, keys).0.kind;
+    let MaterialKind::Principled(own) = kind("Kd 0.5\nPs 0.25") else { panic!() };
+    assert_eq!((own.sheen_color, own.sheen_roughness), (Vec3::splat(0.25), 0.5));
+    let MaterialKind::Principled(own) = kind("Kd 0.5\nPs 0.25\nPc 1") else { panic!() };
+    assert_eq!((own.sheen_color, own.coat_weight), (Vec3::ZERO, 1.0));
 }
 
 #[test]

@@ -292,6 +292,10 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
          of `name`, `type`, `normal`, `anisotropy`, `anisotropy_rotate_deg`, `opacity`, \
          `opacity_cutoff`, `emission`, `emission_two_sided`, `two_sided`, `vertex_color`, `reflectance`",
     );
+    let both = "\"principled\"\nbase_color = [1, 1, 1]\nroughness = 1\ncoat_weight = 1\n\
+                sheen_color = [1, 0, 0]";
+    let covered = HEAD.replace("reflectance = [0.5, 0.5, 0.5]", "").replace("\"diffuse\"", both);
+    case(&covered, "material `grey` (line 10): expected a coat or a sheen, found both");
     case(
         &HEAD.replace("reflectance", "anisotropy = 0.5\nreflectance"),
         "anisotropy is for conductor and principled materials",

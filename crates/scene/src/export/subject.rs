@@ -77,10 +77,13 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Names a coat, which is written to glTF alone.
-    pub(super) fn without_coat(&mut self, material: &Principled) {
+    /// Names a coat or a sheen, which are written to glTF alone.
+    pub(super) fn without_cover(&mut self, material: &Principled) {
         if material.coat_weight > 0.0 {
             self.warn("its coat is left out");
+        }
+        if material.sheen_color != Vec3::ZERO {
+            self.warn("its sheen is left out");
         }
     }
 

@@ -142,10 +142,20 @@ pub(crate) struct PrincipledEntry {
     /// √α of the coat, 0…1.
     #[serde(default)]
     pub coat_roughness: f32,
+    /// Colour of a rim as cloth has it, 0…1; not below a coat.
+    #[serde(default)]
+    pub sheen_color: [f32; 3],
+    /// √α of the sheen, 0…1.
+    #[serde(default = "default_sheen_roughness")]
+    pub sheen_roughness: f32,
 }
 
 fn default_metallic() -> Textured<f32> {
     Textured::Uniform(0.0)
+}
+
+fn default_sheen_roughness() -> f32 {
+    0.5
 }
 
 fn default_specular() -> f32 {

@@ -197,6 +197,10 @@ impl Reader<'_> {
                 let (coat_weight, coat_roughness) = (entry.coat_weight, entry.coat_roughness);
                 self.check_range("coat_weight", &[coat_weight], SHARE)?;
                 self.check_range("coat_roughness", &[coat_roughness], SHARE)?;
+                let sheen_color = self.vector("sheen_color", entry.sheen_color, SHARE)?;
+                self.check_range("sheen_roughness", &[entry.sheen_roughness], SHARE)?;
+                let is_single = coat_weight == 0.0 || sheen_color == Vec3::ZERO;
+                self.check(is_single, "expected a coat or a sheen, found both")?;
                 MaterialKind::Principled(Principled {
                     base_color,
                     metallic,
@@ -206,6 +210,8 @@ impl Reader<'_> {
                     specular_color,
                     coat_weight,
                     coat_roughness,
+                    sheen_color,
+                    sheen_roughness: entry.sheen_roughness,
                 })
             }
             MaterialKindEntry::Dielectric(entry) => {

@@ -126,6 +126,12 @@ impl<'a> Translator<'a> {
                         json!({"clearcoatFactor": weight, "clearcoatRoughnessFactor": roughness});
                     self.extension("KHR_materials_clearcoat", coat);
                 }
+                if own.sheen_color != Vec3::ZERO {
+                    let (color, roughness) = (own.sheen_color.to_array(), own.sheen_roughness);
+                    let sheen =
+                        json!({"sheenColorFactor": color, "sheenRoughnessFactor": roughness});
+                    self.extension("KHR_materials_sheen", sheen);
+                }
                 own
             }
             MaterialKind::Mirror { reflectance } => {

@@ -131,7 +131,7 @@ impl Translator<'_> {
             }
             MaterialKind::Principled(own) => {
                 self.warn_of_masking(own.roughness * own.roughness, "principled");
-                self.subject.without_coat(own);
+                self.subject.without_cover(own);
                 self.subject.warn(
                     "Mitsuba's principled differs from glTF's: its diffuse part is Disney's, here of the \
                      same mean, and its dielectric reflects by Fresnel's equations instead of Schlick's",

@@ -111,7 +111,7 @@ impl<'a> Translator<'a> {
                 fresnel: ConductorFresnel::Schlick { reflectance },
             } => self.metal(*reflectance, *alpha),
             MaterialKind::Principled(own) => {
-                self.subject.without_coat(own);
+                self.subject.without_cover(own);
                 let (share, _) = self.subject.mean_metal_and_roughness();
                 if share > 0.0 && share < 1.0 || self.subject.surface.metallic.is_some() {
                     self.subject

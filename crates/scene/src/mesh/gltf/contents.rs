@@ -20,10 +20,9 @@ const OTHER_PARTS: &str =
     "accessors animations bufferViews buffers cameras images samplers scenes skins textures";
 
 /// Factors whose default is 0, without which an extension changes nothing.
-const FACTORS: [(&str, &str); 3] = [
+const FACTORS: [(&str, &str); 2] = [
     ("KHR_materials_dispersion", "dispersion"),
     ("KHR_materials_iridescence", "iridescenceFactor"),
-    ("KHR_materials_sheen", "sheenColorFactor"),
 ];
 
 /// Tests for an extension of strength 0, as exporters write it.

@@ -57,6 +57,11 @@ fn share(json: &Json, key: &str, default: f32) -> f32 {
     number(json, key, default).clamp(0.0, 1.0)
 }
 
+/// Mean of a texture, 1 without one.
+fn mean(texture: &Option<TextureUse>) -> Vec3 {
+    texture.as_ref().map_or(Vec3::ONE, |texture| texture.mean().into())
+}
+
 /// Reads a colour with components from 0 to 1.
 fn color(json: &Json, key: &str, default: [f32; 3]) -> Vec3 {
     Vec3::from_array(vector(json, key, default)).clamp(Vec3::ZERO, Vec3::ONE)
@@ -192,6 +197,7 @@ impl GltfReader<'_> {
             self.transmission(&mut reading, &mut reflection, is_glass)?;
             self.diffuse_transmission(&mut reading, &mut reflection)?;
             self.coat(&mut reading, &mut reflection)?;
+            self.sheen(&mut reading, &mut reflection)?;
             self.anisotropy(&mut reading, &mut reflection)?;
             let normal = &json["normalTexture"];
             reflection.surface.normal = self.texture(normal, VECTOR, &mut reading)?;
@@ -220,10 +226,6 @@ impl GltfReader<'_> {
         let model = &reading.json["extensions"]["KHR_materials_specular"];
         let strength = self.texture(&model["specularTexture"], ALPHA, reading)?;
         let tint = self.texture(&model["specularColorTexture"], COLOR, reading)?;
-        let mean = |texture: &Option<TextureUse>| match texture {
-            Some(texture) => Vec3::from(texture.mean()),
-            None => Vec3::ONE,
-        };
         let stated_ior = number(reading.extension("KHR_materials_ior"), "ior", DEFAULT_IOR);
         let specular_color = Vec3::from_array(vector(model, "specularColorFactor", [1.0; 3]));
         // The index 0 stands for an infinite one: all light is reflected before the factors.
@@ -437,6 +439,27 @@ impl GltfReader<'_> {
                 reading.ignore_if(!is_alike, features::GLTF_CLEARCOAT_TEXTURE);
             }
             _ => reading.ignore(features::GLTF_CLEARCOAT),
+        }
+        Ok(())
+    }
+
+    /// Covers a metallic-roughness material without a coat by `KHR_materials_sheen`.
+    fn sheen(&mut self, reading: &mut Reading, found: &mut Reflection) -> Result<()> {
+        let json = reading.json;
+        let sheen = &json["extensions"]["KHR_materials_sheen"];
+        let color = color(sheen, "sheenColorFactor", [0.0; 3]);
+        if color == Vec3::ZERO {
+            return Ok(());
+        }
+        match &mut found.kind {
+            MaterialKind::Principled(own) if own.coat_weight == 0.0 => {
+                let tint = self.texture(&sheen["sheenColorTexture"], COLOR, reading)?;
+                let rough = self.texture(&sheen["sheenRoughnessTexture"], ALPHA, reading)?;
+                own.sheen_color = color * mean(&tint);
+                own.sheen_roughness = share(sheen, "sheenRoughnessFactor", 0.0) * mean(&rough).x;
+                reading.ignore_if(tint.or(rough).is_some(), features::GLTF_SHEEN_TEXTURE);
+            }
+            _ => reading.ignore(features::GLTF_SHEEN),
         }
         Ok(())
     }

@@ -62,6 +62,7 @@ pub(super) struct LibraryMaterial {
     metallic: Option<f32>,
     coat_weight: Option<f32>,
     coat_roughness: Option<f32>,
+    sheen: Option<f32>,
     anisotropy: Option<f32>,
     /// Turn of its direction about the normal.
     anisotropy_turns: Option<f32>,
@@ -151,8 +152,7 @@ impl<'a> Library<'a> {
             "ka" if color == Some(Vec3::ZERO) => {}
             "pc" if share.is_some() => entry.coat_weight = share,
             "pcr" if share.is_some() => entry.coat_roughness = share,
-            // A sheen of strength 0 changes nothing.
-            "ps" if share == Some(0.0) => {}
+            "ps" if share.is_some() => entry.sheen = share,
             "aniso" if share.is_some() => entry.anisotropy = share,
             "anisor" if share.is_some() => entry.anisotropy_turns = share,
             "ka" => entry.ignore(features::MTL_KA, features::MTL_KA.name),

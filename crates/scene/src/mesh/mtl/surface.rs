@@ -19,6 +19,8 @@ use crate::{
 
 /// Roughness of a material that states no more than its metallic share.
 const DEFAULT_ROUGHNESS: f32 = 0.5;
+/// Roughness of a sheen, which MTL does not state.
+const SHEEN_ROUGHNESS: f32 = 0.5;
 /// Opacity below which glass is a pane, and not a coat on a base that lets some light through.
 const PANE_OPACITY: f32 = 0.5;
 /// Largest component of a black colour.
@@ -102,6 +104,7 @@ impl LibraryMaterial {
                 surface.anisotropy = width.anisotropy;
                 surface.anisotropy.rotation += TAU * self.anisotropy_turns.unwrap_or(0.0);
             }
+            let is_coated = self.coat_weight.is_some_and(|weight| weight > 0.0);
             MaterialKind::Principled(Principled {
                 base_color: diffuse,
                 metallic: self.metallic.unwrap_or(one_if(surface.metallic.is_some(), 0.0)),
@@ -109,6 +112,8 @@ impl LibraryMaterial {
                 ior,
                 coat_weight: self.coat_weight.unwrap_or(0.0),
                 coat_roughness: self.coat_roughness.unwrap_or(0.0),
+                sheen_color: Vec3::splat(self.sheen.filter(|_| !is_coated).unwrap_or(0.0)),
+                sheen_roughness: SHEEN_ROUGHNESS,
                 ..Principled::default()
             })
         } else if is_pane {
@@ -147,7 +152,8 @@ impl LibraryMaterial {
     fn is_metallic_roughness(&self) -> bool {
         self.roughness.is_some()
             || self.metallic.is_some()
-            || [self.coat_weight, self.anisotropy].into_iter().flatten().any(|share| share > 0.0)
+            || [self.coat_weight, self.sheen, self.anisotropy].map(Option::unwrap_or_default)
+                != [0.0; 3]
             || self.roughness_map.is_some()
             || self.metallic_map.is_some()
     }
