@@ -15,8 +15,8 @@ use crate::{
 
 /// Points per dimension of the quadrature for one material.
 const FINE_POINTS: u32 = 64;
-/// The same for a sheen, whose rim is narrow in azimuth too.
-const SHEEN_POINTS: u32 = 256;
+/// The same for a sheen, over half of the azimuths, since both halves are alike.
+const SHEEN_POINTS: u32 = 96;
 /// Points per dimension of the quadrature for the table that materials share.
 const COARSE_POINTS: u32 = 32;
 
@@ -111,8 +111,8 @@ pub(crate) fn coat_words(weight: f32, alpha: f32) -> Vec<u32> {
 /// Words of a sheen whose largest channel is `strength`, likewise; sums over the hemisphere are by midpoints.
 pub(crate) fn sheen_words(strength: f32, alpha: f32) -> Vec<u32> {
     let albedo = |outgoing: Vec3| {
-        let light = |u| {
-            let incident = sample_hemisphere(u);
+        let light = |u: Vec2| {
+            let incident = sample_hemisphere(u * vec2(1.0, 0.5));
             incident.z * sheen_value(outgoing + incident, outgoing.z, incident.z, alpha)
         };
         2.0 * PI * grid(SHEEN_POINTS).map(light).sum::<f32>() / (SHEEN_POINTS * SHEEN_POINTS) as f32
