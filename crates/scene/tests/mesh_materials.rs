@@ -914,6 +914,10 @@ fn colours_of_vertices_without_a_material_are_seen() {
             scene.warnings
         );
     }
+    // The least grey of a file of bytes is not white.
+    let dark = text.replace("0 0.5 0", "1 1 1").replace(" 1 0 0\nv 1", " 255 0 0\nv 1");
+    let colors = Scene::load(&folder.write("a.obj", dark)).unwrap().geometry.colors;
+    assert!(colors[1][..3].iter().all(|channel| *channel < 1e-3), "{colors:?}");
     let colors = Attribute::floats("COLOR_0", "VEC3", &[0.5; 9]);
     let text = gltf_of(&[positions(), colors], 3, "", "");
     let scene = Scene::load(&folder.write("a.gltf", text)).unwrap();

@@ -34,8 +34,8 @@ const NONE: u32 = u32::MAX;
 /// Most vertices of a chain; further vertices of its position are found by hash.
 const LONGEST_CHAIN: usize = 16;
 
-/// Colour of a vertex without one, among others with.
-const WHITE: [f32; 3] = [1.0; 3];
+/// Channels of a vertex without a colour, among others with; it becomes white.
+const NO_COLOR: f32 = f32::NAN;
 
 /// Reads an OBJ file and the material libraries beside it; a missing library is a warning.
 ///
@@ -109,7 +109,7 @@ struct ObjReader {
     path: PathBuf,
     line: usize,
     positions: Vec<[f32; 3]>,
-    /// Colours of positions as they stand; white where only others have one.
+    /// Colours of positions as they stand.
     colors: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
@@ -143,7 +143,7 @@ impl ObjReader {
                 let position = self.vector(rest, 3)?;
                 if rest.split_ascii_whitespace().nth(5).is_some() {
                     let [_, _, _, r, g, b] = self.vector(rest, 3)?;
-                    self.colors.resize(self.positions.len(), WHITE);
+                    self.colors.resize(self.positions.len(), [NO_COLOR; 3]);
                     self.colors.push([r, g, b]);
                 }
                 self.positions.push(position);
@@ -243,7 +243,7 @@ impl ObjReader {
         };
         self.vertices.push(Vertex { uv, normal, next });
         if let Some([r, g, b]) = self.colors.get(position as usize) {
-            self.mesh.colors.resize(self.mesh.positions.len(), [1.0; 4]);
+            self.mesh.colors.resize(self.mesh.positions.len(), [NO_COLOR; 4]);
             self.mesh.colors.push([*r, *g, *b, 1.0]);
         }
         self.mesh.positions.push(self.positions[position as usize]);
@@ -340,12 +340,12 @@ impl ObjReader {
             self.mesh.materials.push(material);
         }
         if !self.mesh.colors.is_empty() {
-            self.mesh.colors.resize(self.mesh.positions.len(), [1.0; 4]);
+            self.mesh.colors.resize(self.mesh.positions.len(), [NO_COLOR; 4]);
             let channels = || self.mesh.colors.iter().flatten();
             let most = if channels().any(|channel| *channel > 1.0) { 255.0 } else { 1.0 };
-            for color in self.mesh.colors.iter_mut().filter(|color| **color != [1.0; 4]) {
+            for color in &mut self.mesh.colors {
                 let [r, g, b] = [0, 1, 2].map(|at| srgb_to_linear(color[at] / most));
-                *color = [r, g, b, 1.0];
+                *color = if color[0].is_nan() { [1.0; 4] } else { [r, g, b, 1.0] };
             }
         }
         if let Some(line) = self.first_smoothing
