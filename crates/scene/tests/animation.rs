@@ -145,6 +145,11 @@ fn nodes_of_a_gltf_file_move() {
     let cubic = r#"{"input": 1, "output": 4, "interpolation": "CUBICSPLINE"}"#;
     assert_eq!(corner(cubic, Some(1.5)), Vec3::new(1.5 + 0.25 - 1.0, 0.0, 0.0));
     assert_eq!(corner(cubic, Some(3.0)), Vec3::new(1.5 + 1.0, 0.0, 0.0));
+    // The parts of a transform that no channel moves stand.
+    let wide = r#"[{"mesh": 0, "scale": [2, 3, 1]}]"#;
+    let wide = document(&channel("translation"), linear).replace(r#"[{"mesh": 0}]"#, wide);
+    let geometry = at("ride.gltf", &wide, Some(1.25)).unwrap().geometry;
+    assert_eq!(geometry.positions, [[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [0.0, 3.0, 1.0]]);
 
     // A quarter turn about Y, by the shorter way although the quaternions have opposite signs.
     let turns = r#"{"input": 1, "output": 3}"#;

@@ -602,6 +602,38 @@ fn sparse_accessors_replace_elements_of_a_view_or_of_zeros() {
         let mesh = Mesh::read(&path, &mut Vec::new()).unwrap();
         assert_eq!(mesh.positions, [[0.0; 3], [0.0, 0.0, 7.0], [0.0, last, 0.0]]);
     }
+    // Indices of two bytes, 0 and 1, and values lie behind others.
+    let places = [2_u16, 0, 1].map(u16::to_le_bytes).concat();
+    let attributes = [
+        positions(),
+        Attribute("_PLACES", 5123, "SCALAR", false, places),
+        Attribute::floats("_NEW", "VEC3", &[9.0, 9.0, 9.0, 4.0, 4.0, 4.0, 5.0, 5.0, 5.0]),
+    ];
+    let sparse = r#"{"sparse": {"count": 2, "indices": {"bufferView": 1, "byteOffset": 2,
+        "componentType": 5123}, "values": {"bufferView": 2, "byteOffset": 12}}, "bufferView": 0"#;
+    let text = gltf_of(&attributes, 3, "", "").replacen(r#"{"bufferView": 0"#, sparse, 1);
+    let mesh = Mesh::read(&Folder::new().write("a.gltf", text), &mut Vec::new()).unwrap();
+    assert_eq!(mesh.positions[..2], [[4.0; 3], [5.0; 3]]);
+}
+
+/// Quaternions need not have the length 1.
+#[test]
+fn instances_of_a_node_are_stretched_then_turned_then_shifted() {
+    let attributes = [
+        positions(),
+        Attribute::floats("_SHIFTS", "VEC3", &[5.0, 6.0, 7.0].repeat(3)),
+        Attribute::floats("_TURNS", "VEC4", &[0.0, 0.0, 2.0, 2.0].repeat(3)),
+        Attribute::floats("_SIZES", "VEC3", &[2.0, 3.0, 4.0].repeat(3)),
+    ];
+    let nodes = r#"[{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes":
+        {"TRANSLATION": 1, "ROTATION": 2, "SCALE": 3}}}}]"#;
+    let text = gltf_of(&attributes, 3, "", "").replace(r#"[{"mesh": 0}]"#, nodes);
+    let mesh = Mesh::read(&Folder::new().write("a.gltf", text), &mut Vec::new()).unwrap();
+    let expected = [[5.0, 6.0, 7.0], [5.0, 8.0, 7.0], [2.0, 6.0, 7.0]].repeat(3);
+    for (found, expected) in mesh.positions.iter().zip(&expected) {
+        assert!(Vec3::from(*found).abs_diff_eq(Vec3::from(*expected), 1e-5), "{found:?}");
+    }
+    assert_eq!(mesh.positions.len(), expected.len());
 }
 
 #[test]
@@ -1077,11 +1109,14 @@ fn mtl_materials_become_surfaces() {
     assert_eq!(found.surface.metallic.unwrap().encoding, Encoding::Linear);
     let emission = found.surface.emission.unwrap();
     assert_eq!((emission.radiance, emission.two_sided), (Vec3::new(2.0, 1.0, 0.0), true));
-    let emission = mtl_material(&folder, "map_Ke grey.png").0.surface.emission.unwrap();
-    assert_eq!(
-        (emission.radiance, emission.texture.unwrap().encoding),
-        (Vec3::ONE, Encoding::Srgb)
-    );
+    // Exporters write a black factor beside an image.
+    for keys in ["map_Ke grey.png", "Ke 0 0 0\nmap_Ke grey.png"] {
+        let emission = mtl_material(&folder, keys).0.surface.emission.unwrap();
+        assert_eq!(
+            (emission.radiance, emission.texture.unwrap().encoding),
+            (Vec3::ONE, Encoding::Srgb)
+        );
+    }
 }
 
 #[test]
@@ -1094,6 +1129,12 @@ fn opacities_above_one_are_one() {
     let values = found.surface.color.unwrap().values();
     assert_eq!(values, [[9.0, 9.0, 9.0, 0.5], [9.0, 9.0, 9.0, 1.0]]);
     assert!(warnings[0].contains("1 values are above 65504, or opacities above 1"), "{warnings:?}");
+    // Grey images have an opacity too.
+    let grey = [("Y", vec![0.25, 4.0]), ("A", vec![0.5, 1.0])];
+    image.channels = grey.map(|(name, values)| (name.to_owned(), values)).into();
+    image.write_exr(&folder.path().join("a.exr")).unwrap();
+    let values = mtl_material(&folder, "map_Kd a.exr").0.surface.color.unwrap().values();
+    assert_eq!(values, [[0.25, 0.25, 0.25, 0.5], [4.0, 4.0, 4.0, 1.0]]);
 }
 
 #[test]
@@ -1117,6 +1158,15 @@ fn options_of_images_stand_before_names_with_spaces() {
         assert_eq!(color.texture.name, expected.display().to_string());
     }
     assert!(mtl_material(&folder, "map_Kd").1[0].contains("image ``"));
+    for (letter, channels) in [
+        ("r", Channels::Red),
+        ("b", Channels::Blue),
+        ("m", Channels::Alpha),
+        ("l", Channels::Color),
+    ] {
+        let keys = format!("map_Pr -imfchan {letter} oak.png");
+        assert_eq!(mtl_material(&folder, &keys).0.surface.roughness.unwrap().channels, channels);
+    }
 }
 
 /// The tip of the arrow of the Khronos model `TextureTransformTest` is at 7/9 of the image; its marks for the
