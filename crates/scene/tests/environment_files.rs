@@ -175,6 +175,10 @@ fn texels_that_are_not_radiance_become_black_and_are_counted() {
         let expected = if [0, 5, 6, 30, 31].contains(&index) { Vec3::ZERO } else { texel(index) };
         assert_eq!(*value, expected, "texel {index}");
     }
+    // A scale may bring a texel back among numbers.
+    let mut warnings = Vec::new();
+    let map = EnvironmentMap::load(&path, 1e-20, &mut warnings).unwrap();
+    assert!(warnings[0].contains("4 of 32 texels") && map.texels[30].x > 9e9, "{warnings:?}");
 }
 
 #[test]

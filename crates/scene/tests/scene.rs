@@ -10,7 +10,8 @@ use std::{
 };
 
 use fenestra_scene::{
-    Error, Scene, export,
+    Error, Scene, export, geometry_hash,
+    instance::Instance,
     lamp::{LampKind, Spot, SpotFalloff},
     light_group::LightGroups,
     load::{LoadOptions, arrays::Arrays},
@@ -19,13 +20,14 @@ use fenestra_scene::{
     picture::{Image, RgbImage},
     still_hash,
     texture::{Channels, Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
+    transform::Transform,
 };
 use glam::Vec3;
 
 use crate::support::{
     assert_contains,
     folder::Folder,
-    gltf::{base64, floats, gltf, png},
+    gltf::{Attribute, base64, floats, gltf, gltf_of, png},
     seeds::glb,
 };
 
@@ -696,6 +698,20 @@ fn a_texture_without_coordinates_is_a_warning_by_name() {
     assert!(
         warning.contains("object `sheet` (bare.obj, line 14): the material `grey` has textures")
     );
+    // A material may read the second set of coordinates, and the file have the first alone.
+    let attributes = [
+        Attribute::floats("POSITION", "VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
+        Attribute::floats("TEXCOORD_0", "VEC2", &[0.0; 6]),
+    ];
+    let sail = r#"{"name": "sail", "pbrMetallicRoughness":
+        {"baseColorTexture": {"index": 0, "texCoord": 1}}}"#;
+    let rest = r#", "images": [{"uri": "wood.png"}], "textures": [{"source": 0}]"#;
+    let path = folder.write("sail.gltf", gltf_of(&attributes, 3, sail, rest));
+    let warnings = Scene::load(&path).unwrap().warnings.concat();
+    assert!(
+        warnings.contains("the material `sail` has textures, but the mesh has no"),
+        "{warnings}"
+    );
     // A shape has coordinates of its own.
     let with_shape = with_box("").replace("[0.5, 0.5, 0.5]", "{ texture = \"wood.png\" }");
     assert_eq!(load(&folder, &with_shape).unwrap().warnings, [""; 0]);
@@ -1075,7 +1091,15 @@ fn the_hash_follows_every_part_of_surfaces_and_lights() {
     fn stretched(scene: &mut Scene, rotation: f32, direction: Option<TextureUse>) {
         surface(scene).anisotropy = Anisotropy { strength: 0.5, rotation, direction };
     }
-    let changes: [fn(&mut Scene); 18] = [
+    fn shine(scene: &mut Scene, direction: Vec3, irradiance: f32) {
+        let irradiance = Vec3::splat(irradiance);
+        scene.lamps[0].kind = LampKind::Directional { direction, irradiance };
+    }
+    fn repeat(scene: &mut Scene, width: f32, replaces: bool) {
+        let place = Transform::new([width, 1.0, 1.0], [0.0; 3], [0.0; 3]);
+        scene.geometry.instances.push(Instance::new(0, &place, 0, replaces).unwrap());
+    }
+    let changes: [fn(&mut Scene); 24] = [
         |_| (),
         |scene| stretched(scene, 0.0, None),
         |scene| stretched(scene, 0.5, None),
@@ -1098,6 +1122,12 @@ fn the_hash_follows_every_part_of_surfaces_and_lights() {
         |scene| beam(scene).inner_angle_rad = 0.1,
         |scene| beam(scene).outer_angle_rad = 1.0,
         |scene| beam(scene).falloff = SpotFalloff::LinearAngle,
+        |scene| shine(scene, Vec3::NEG_Y, 1.0),
+        |scene| shine(scene, Vec3::NEG_Y, 2.0),
+        |scene| shine(scene, Vec3::NEG_Z, 1.0),
+        |scene| repeat(scene, 1.0, true),
+        |scene| repeat(scene, 1.0, false),
+        |scene| repeat(scene, 2.0, true),
     ];
     let hashes = changes.map(|change| {
         let mut scene = original.clone();
@@ -1105,6 +1135,13 @@ fn the_hash_follows_every_part_of_surfaces_and_lights() {
         still_hash(&scene)
     });
     assert_eq!(hashes.iter().collect::<HashSet<_>>().len(), changes.len(), "{hashes:#?}");
+    // Instances block light where they stand.
+    let [narrow, wide] = [1.0, 2.0].map(|width| {
+        let mut scene = original.clone();
+        repeat(&mut scene, width, true);
+        geometry_hash(&scene)
+    });
+    assert_ne!(narrow, wide);
 }
 
 #[test]
@@ -1206,6 +1243,14 @@ fn ply_reads_all_three_encodings() {
     assert_eq!(read(&folder, "strips.ply", no_strips).triangles.len(), 1);
     let windows = ascii_ply("3 0 1 2").replace('\n', "\r\n");
     assert_eq!(read(&folder, "windows.ply", windows).triangles, [[0, 1, 2]]);
+    let mut bytes = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty char x\n\
+        property uchar y\nproperty int8 z\nelement face 1\n\
+        property list uchar uint8 vertex_indices\nend_header\n"
+        .to_vec();
+    bytes.extend([255, 255, 128, 1, 0, 0, 0, 1, 127, 3, 0, 1, 2]);
+    let of_bytes = read(&folder, "bytes.ply", bytes);
+    let expected = [[-1.0, 255.0, -128.0], [1.0, 0.0, 0.0], [0.0, 1.0, 127.0]];
+    assert_eq!((of_bytes.positions, of_bytes.triangles), (expected.to_vec(), vec![[0, 1, 2]]));
 }
 
 #[test]
