@@ -408,6 +408,18 @@ fn models_become_materials() {
     };
     assert_eq!((gold.metallic, gold.coat_weight, warnings.len()), (1.0, 1.0, 0));
     assert!(gold.coat_roughness < 0.05 && gold.base_color.x > 0.5, "{gold:?}");
+    // Coat and metal have a width each.
+    let width = |alpha: f32| {
+        format!(
+            "<string name=\"distribution\" value=\"ggx\"/><float name=\"alpha\" value=\"{alpha}\"/>"
+        )
+    };
+    let (coat, metal) = (width(0.25), width(0.04));
+    let both = format!(
+        "<bsdf type=\"roughcoating\">{coat}<bsdf type=\"roughconductor\">{metal}</bsdf></bsdf>"
+    );
+    let MaterialKind::Principled(both) = material(&both).0.kind else { panic!() };
+    assert_eq!((both.roughness, both.coat_roughness), (0.04_f32.sqrt(), 0.5));
     let plastic = material(r#"<bsdf type="pplastic"><float name="alpha" value="0.2"/></bsdf>"#);
     let MaterialKind::Plastic { alpha: 0.2, .. } = plastic.0.kind else { panic!() };
     assert!(plastic.1.iter().any(|text| text.contains("polarisation of `pplastic`")));
@@ -1447,12 +1459,13 @@ fn daylight_stands_where_mitsuba_has_it() {
     };
     let found = brightest(&sky(&format!("{upright}{}", clock(14, 30, 1800)), "3.0.0"));
     assert!(found.dot(DEFAULT_SUN) > 0.9999, "{found}: an hour in three parts");
-    let of_sky = |scale: f32| {
-        let scales = [("sky_scale", scale), ("sun_scale", 0.0)]
+    // One scale is that of both.
+    let of_sky = |name: &str, scale: f32| {
+        let scales = [(name, scale), ("sun_scale", 0.0)]
             .map(|(name, value)| format!("<float name=\"{name}\" value=\"{value}\"/>"));
         sky(&format!("{upright}{}", scales.concat()), "3.0.0").texels.iter().sum::<Vec3>()
     };
-    assert!((of_sky(2.0) / of_sky(0.5)).abs_diff_eq(Vec3::splat(4.0), 1e-3));
+    assert!((of_sky("scale", 2.0) / of_sky("sky_scale", 0.5)).abs_diff_eq(Vec3::splat(4.0), 1e-3));
 }
 
 /// The zenith of version 0.6 is +Y, and its north −Z, as those of scene files.

@@ -9,7 +9,7 @@ use std::{
 };
 
 use fenestra_scene::{
-    Camera, Filter, Scene,
+    Camera, Filter, Geometry, Scene,
     coat::albedo_below_coat,
     lamp::{LampKind, SpotFalloff},
     load::LoadOptions,
@@ -239,8 +239,13 @@ fn quadrics_and_patches_face_outward() {
     }
     let curved = world("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]");
     assert_eq!(curved.geometry.triangles.len(), 512);
-    let is_saddle = |at: &Vec3| (at.z - at.x * at.y).abs() < 1e-5;
-    assert!(positions(&curved).iter().all(is_saddle));
+    let Geometry { normals, uvs, .. } = &curved.geometry;
+    for (at, (normal, uv)) in positions(&curved).iter().zip(normals.iter().zip(&uvs[0])) {
+        let expected = Vec3::new(-at.y, -at.x, 1.0).normalize();
+        assert!((at.z - at.x * at.y).abs() < 1e-5, "a saddle, not {at}");
+        assert!(Vec3::from(*normal).abs_diff_eq(expected, 1e-5), "{at}: {normal:?}");
+        assert!(at.truncate().abs_diff_eq(Vec2::from(*uv), 1e-5), "{at}: {uv:?}");
+    }
     let flat = world("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 1 1 0 2 1 0]");
     assert_eq!(flat.geometry.triangles.len(), 2);
     // v of a sphere runs from −z to +z.
@@ -335,6 +340,10 @@ fn materials_are_the_nearest() {
     let glass = r#""dielectric" "bool remaproughness" false "float uroughness" 0.5 "float vroughness" 0.25"#;
     let MaterialKind::Dielectric { alpha, .. } = material(glass).kind else { panic!() };
     assert_eq!((alpha, material(glass).surface.anisotropy.strength), (0.375, 0.0));
+    // Two roughnesses become widths before their mean.
+    let frosted = material(r#""dielectric" "float uroughness" 0.04 "float vroughness" 0.36"#).kind;
+    let MaterialKind::Dielectric { alpha, .. } = frosted else { panic!() };
+    assert!((alpha - 0.4).abs() < 1e-6, "{alpha}");
     // The metal below a coat has a roughness of its own, and reflects less than in air.
     let coated = r#""coatedconductor" "float conductor.roughness" 0.25
         "float interface.roughness" 0.0625 "rgb conductor.eta" [1.5 1.5 0.3] "rgb conductor.k" [0 3 3]"#;
@@ -538,7 +547,7 @@ fn images_are_multiplied_and_mixed_texel_by_texel() {
 fn an_image_is_decoded_as_each_texture_says() {
     let folder = Folder::new();
     let grey = folder.path().join("a.png");
-    image::save_buffer(grey, &[128; 3], 1, 1, image::ColorType::Rgb8).unwrap();
+    image::save_buffer(grey, &[128; 4], 1, 1, image::ColorType::Rgba8).unwrap();
     let value = 128.0_f32 / 255.0;
     let expected = [
         ("sRGB", ((value + 0.055) / 1.055).powf(2.4)),
@@ -556,8 +565,9 @@ fn an_image_is_decoded_as_each_texture_says() {
     let text = format!("{MIRRORED} WorldBegin {}", textured.join("\n"));
     let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
     for (material, (encoding, expected)) in scene.materials.iter().zip(expected) {
-        let mean = material.surface.color.as_ref().unwrap().mean()[0];
-        assert!((mean - expected).abs() < 1e-3, "{encoding}: {mean}, expected {expected}");
+        let [red, .., opacity] = material.surface.color.as_ref().unwrap().values()[0];
+        assert!((red - expected).abs() < 1e-3, "{encoding}: {red}, expected {expected}");
+        assert!((opacity - value).abs() < 1e-3, "{encoding}: {opacity}, expected {value}");
     }
 }
 
@@ -614,7 +624,8 @@ fn lamps_have_their_places_and_powers() {
     let text = r#"Translate 1 0 0
         LightSource "point" "rgb I" [1 2 3] "float scale" 2 "point3 from" [0 1 0]
         LightSource "point" "float power" 12.566371
-        LightSource "distant" "point3 from" [0 1 0] "point3 to" [0 0 0] "float illuminance" 3
+        LightSource "distant" "point3 from" [0 1 0] "point3 to" [0 0 0] "float illuminance" 6
+            "float scale" 0.5
         LightSource "spot" "float coneangle" 40 "float conedeltaangle" 10 "point3 to" [1 0 0]
         LightSource "spot" "float coneangle" 60 "float conedeltaangle" 60 "float power" 3"#;
     let scene = world(text);
