@@ -181,6 +181,19 @@ mod tests {
     }
 
     #[test]
+    fn the_first_and_the_last_of_sampled_wavelengths_count_by_half() {
+        let weighted = [(500.0, 0.5), (550.0, 1.0), (600.0, 0.5)].map(|(nm, share)| {
+            let row = observer(nm);
+            row.xyz() * row.w * share
+        });
+        let luminous: f64 = weighted.iter().map(|xyz| xyz.y).sum();
+        let found = srgb_weights(&[500.0, 550.0, 600.0]).unwrap();
+        for (found, xyz) in found.into_iter().zip(weighted) {
+            assert!(found.abs_diff_eq(rgb_from_xyz(xyz / luminous), 1e-9), "{found}");
+        }
+    }
+
+    #[test]
     fn samples_end_at_their_ends() {
         let samples = Samples::new(vec![[500.0, 1.0], [600.0, 3.0]]);
         let found =

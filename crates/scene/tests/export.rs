@@ -7,7 +7,7 @@ use fenestra_scene::{
     export::{Settings, gltf, mitsuba, pbrt},
     lamp::LampKind,
     load::LoadOptions,
-    material::MaterialKind,
+    material::{MaterialKind, Surface},
     math::colour::luminance,
     texture::{Texels, Texture, TextureUse, Wrap},
 };
@@ -183,6 +183,14 @@ fn absorption_views_and_spots_come_back() {
         let angles = [spot.inner_angle_rad, spot.outer_angle_rad].map(f32::to_degrees);
         assert!((angles[0] - 10.0).abs().max((angles[1] - 30.0).abs()) < 1e-3, "{angles:?}");
     }
+    // The plane of focus lies between Mitsuba's clip planes, however far it is.
+    (scene.camera.aperture_radius, scene.camera.focus_distance) = (0.1, 1e4);
+    let path = folder.path().join("a.xml");
+    mitsuba::export(&scene, &path, SETTINGS).write().unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.contains("name=\"far_clip\" value=\"20000\""), "{text}");
+    let camera = Scene::load(&path).unwrap().camera;
+    assert_eq!((camera.aperture_radius, camera.focus_distance), (0.1, 1e4));
 }
 
 #[test]
@@ -196,6 +204,14 @@ fn cut_surfaces_and_opacities_as_colours_come_back_from_pbrt() {
     let clay = "type = \"diffuse\"\nreflectance = [0, 0, 0]\nopacity_cutoff = 0.5\nopacity = ";
     let opacity = |factor: &str| read(&format!("{clay}{factor}")).opacity.factor;
     assert_eq!([opacity("0.5"), opacity("0.4")], [1.0, 0.0]);
+    // One channel stands for all.
+    for (channel, expected) in [("r", [255, 255]), ("g", [116, 88]), ("b", [102, 0])] {
+        let image = format!("{{ texture = \"a.png\", linear = true, channel = \"{channel}\" }}");
+        let surface = read(&format!("type = \"diffuse\"\nreflectance = {image}"));
+        let values = surface.color.unwrap().values();
+        let found = values.iter().map(|value| [0, 1, 2].map(|at| (255.0 * value[at]).round()));
+        assert_eq!(found.collect::<Vec<_>>(), expected.map(|byte| [byte as f32; 3]), "{channel}");
+    }
     // Opacity is linear, although the image is one of colours.
     let image = folder.path().join("b.png");
     image::save_buffer(image, &[9, 9, 9, 128], 1, 1, image::ColorType::Rgba8).unwrap();
@@ -258,6 +274,12 @@ fn sheets_come_back() {
 #[test]
 fn mirrors_and_coats_come_back_from_pbrt() {
     let folder = Folder::new();
+    // A quarter of the reflectance 0.04 is that of the index 1.1 / 0.9.
+    let clay =
+        "type = \"principled\"\nbase_color = [0.5, 0.5, 0.5]\nroughness = 0.5\nspecular = 0.25";
+    let [_, (_, read)] = again(&folder, &square(&folder, clay));
+    let MaterialKind::Plastic { ior, .. } = read.materials[0].kind else { panic!() };
+    assert!((ior - 1.1 / 0.9).abs() < 1e-4, "{ior}");
     let [_, (_, read)] =
         again(&folder, &square(&folder, "type = \"mirror\"\nreflectance = [1, 1, 1]"));
     assert!(matches!(read.materials[0].kind, MaterialKind::Mirror { reflectance: Vec3::ONE }));
@@ -311,6 +333,54 @@ fn light_of_backs_for_mitsuba_lies_behind_and_is_whole() {
     let scene = square(&folder, &format!("{clay}\n{holes}"));
     let warnings = mitsuba::export(&scene, &path, SETTINGS).warnings.concat();
     assert!(warnings.contains("also where it is not opaque"), "{warnings}");
+}
+
+/// Corners of the triangles of the first material with their places in its images of colour and opacity.
+fn places_in_images(scene: &Scene) -> Vec<[Vec3; 3]> {
+    let Surface { color, opacity, .. } = &scene.materials[0].surface;
+    let Geometry { positions, uvs, triangles, materials, .. } = &scene.geometry;
+    let own = triangles.iter().zip(materials).filter(|(_, material)| **material == 0);
+    let corner = |&corner: &u32| {
+        let place = |used: &Option<TextureUse>| {
+            let used = used.as_ref().unwrap();
+            let uv = Vec2::from(uvs[used.uv_set as usize][corner as usize]).extend(1.0);
+            Vec2::from(used.image_from_uv.map(|row| Vec3::from(row).dot(uv))).extend(0.0)
+        };
+        [positions[corner as usize].into(), place(color), place(&opacity.texture)]
+    };
+    own.flat_map(|(triangle, _)| triangle).map(corner).collect()
+}
+
+/// In pbrt the meshes have the coordinates of the first image, by which the second is placed.
+#[test]
+fn images_lie_where_they_did_by_the_second_coordinates() {
+    let folder = Folder::new();
+    let image = |place: &str| format!("{{ texture = \"a.png\", channel = \"g\", {place} }}");
+    let clay = format!(
+        "type = \"diffuse\"\nreflectance = {}\nopacity = {}",
+        image("scale = [2, 3], offset = [0.25, 0.5]"),
+        image("scale = [4, 0.5], offset = [0.5, 0.125]"),
+    );
+    let mut scene = square(&folder, &clay);
+    let geometry = &mut scene.geometry;
+    geometry.uvs[1] = geometry.uvs[0].iter().map(|&[u, v]| [1.0 - v, 0.5 * u]).collect();
+    let Surface { color, opacity, .. } = &mut scene.materials[0].surface;
+    for used in [color, &mut opacity.texture] {
+        used.as_mut().unwrap().uv_set = 1;
+    }
+    let path = folder.path().join("a.xml");
+    mitsuba::export(&scene, &path, SETTINGS).write().unwrap();
+    let mitsuba = Scene::load(&path).unwrap();
+    let [_, (_, pbrt)] = again(&folder, &scene);
+    let expected = places_in_images(&scene);
+    for read in [mitsuba, pbrt] {
+        let found = places_in_images(&read);
+        assert!(found.len() == expected.len() && !found.is_empty(), "{}", found.len());
+        for (found, expected) in found.iter().zip(&expected) {
+            let alike = |part: usize| found[part].abs_diff_eq(expected[part], 1e-4);
+            assert!((0..3).all(alike), "{found:?}, not {expected:?}");
+        }
+    }
 }
 
 #[test]

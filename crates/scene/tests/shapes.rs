@@ -157,6 +157,15 @@ fn lathe_splines_are_smooth_but_for_their_corners() {
     let mesh = shape("lathe", vase).unwrap();
     assert_eq!(check_closed(&mesh).1, 2);
     assert!(mesh.positions.contains(&[0.5, 0.0, 0.0]), "control points are on the curve");
+    // A profile that is the same from both ends makes a shape that is.
+    let spindle = "smooth = 4\nprofile = [[0.3, 0], [0.6, 0.25], [0.6, 0.75], [0.3, 1]]";
+    let positions = shape("lathe", spindle).unwrap().positions;
+    for [x, y, z] in &positions {
+        let is_mirrored = |other: &[f32; 3]| {
+            (other[0] - x).abs() + (other[1] + y - 1.0).abs() + (other[2] - z).abs() < 1e-5
+        };
+        assert!(positions.iter().any(is_mirrored), "{x} {y} {z}");
+    }
     // On a straight wall, every spline point keeps its radius.
     let wall = "smooth = 8\nprofile = [[0.5, 0.0], [0.5, 0.7], [0.5, 1.0]]";
     let (found, _) = check_closed(&shape("lathe", wall).unwrap());

@@ -251,3 +251,20 @@ impl EnergyLimit {
         self.factors[bin] * (1.0 - fraction) + self.factors[bin + 1] * fraction
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bin for each degree, with its number as factor.
+    #[test]
+    fn factors_hold_in_the_middle_of_their_bins() {
+        let factors = (0..POLAR_BINS).map(|bin| bin as f32).collect();
+        let limit = EnergyLimit { largest_albedo: 2.0, factors };
+        for (angle_deg, expected) in [(0.2_f32, 0.0), (10.5, 10.0), (11.0, 10.5), (89.9, 89.0)] {
+            let (sine, cosine) = angle_deg.to_radians().sin_cos();
+            let found = limit.factor(vec3(sine, 0.0, cosine));
+            assert!((found - expected).abs() < 1e-3, "{angle_deg}°: {found}");
+        }
+    }
+}
