@@ -362,7 +362,7 @@ impl Default for Principled {
             coat_weight: 0.0,
             coat_roughness: 0.0,
             sheen_color: Vec3::ZERO,
-            sheen_roughness: 0.0,
+            sheen_roughness: 0.5,
         }
     }
 }

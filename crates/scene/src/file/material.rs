@@ -9,6 +9,7 @@ use super::{
     Entry,
     value::{TextureEntry, Textured},
 };
+use crate::material::Principled;
 
 pub(crate) type MaterialEntry = Entry<MaterialKeys, MaterialKindEntry>;
 
@@ -155,7 +156,7 @@ fn default_metallic() -> Textured<f32> {
 }
 
 fn default_sheen_roughness() -> f32 {
-    0.5
+    Principled::default().sheen_roughness
 }
 
 fn default_specular() -> f32 {

@@ -19,8 +19,6 @@ use crate::{
 
 /// Roughness of a material that states no more than its metallic share.
 const DEFAULT_ROUGHNESS: f32 = 0.5;
-/// Roughness of a sheen, which MTL does not state.
-const SHEEN_ROUGHNESS: f32 = 0.5;
 /// Opacity below which glass is a pane, and not a coat on a base that lets some light through.
 const PANE_OPACITY: f32 = 0.5;
 /// Largest component of a black colour.
@@ -113,7 +111,6 @@ impl LibraryMaterial {
                 coat_weight: self.coat_weight.unwrap_or(0.0),
                 coat_roughness: self.coat_roughness.unwrap_or(0.0),
                 sheen_color: Vec3::splat(self.sheen.filter(|_| !is_coated).unwrap_or(0.0)),
-                sheen_roughness: SHEEN_ROUGHNESS,
                 ..Principled::default()
             })
         } else if is_pane {
