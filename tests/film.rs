@@ -544,6 +544,26 @@ fn merged_images_equal_one_run_up_to_rounding() {
     assert_eq!((merged.origin, merged.film_size), ([3, 1], [10, 6]));
 }
 
+/// Parts have other seeds and layers: the file names no seed and describes no layer that it lacks.
+#[test]
+fn merged_images_say_nothing_that_is_true_of_one_part_alone() {
+    let (_, first, second) = whole_and_parts();
+    let mut other = second.metadata.clone();
+    other.sample_ranges = vec![range(2, 0, 20)];
+    other.candidates = Some(1);
+    other.mattes.clear();
+    let mut images = [&first, &second].map(|checkpoint| checkpoint.sums.to_image(&[]));
+    first.metadata.store(&mut images[0]);
+    other.store(&mut images[1]);
+    let path = Path::new("merged.exr");
+    let parts = [(&images[0], &first.metadata), (&images[1], &other)];
+    let parts = parts.map(|(image, metadata)| Part { path, image, metadata });
+    let (merged, metadata) = merge_images(&parts).unwrap();
+    assert_eq!(Metadata::load(&merged, path).unwrap(), metadata);
+    assert_eq!((metadata.candidates, metadata.mattes.len()), (None, 0));
+    assert!(!merged.attributes.contains_key("fenestra.seed"));
+}
+
 #[test]
 fn windows_join_to_the_film_to_the_bit() {
     let (whole, ..) = whole_and_parts();

@@ -285,6 +285,8 @@ fn check<T>(parts: &[T], facts: impl Fn(&T) -> (&Path, Placement, &Metadata)) ->
 fn add_metadata(merged: &mut Metadata, part: &Metadata) {
     merged.add_ranges(part);
     merged.candidates = merged.candidates.filter(|_| merged.candidates == part.candidates);
+    // A layer that a part lacks is no layer of the whole.
+    merged.mattes.retain(|name, _| part.mattes.contains_key(name));
     merged.seconds += part.seconds;
     for (name, seconds) in &part.gpu_seconds {
         *merged.gpu_seconds.entry(name.clone()).or_default() += seconds;

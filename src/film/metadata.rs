@@ -142,8 +142,13 @@ impl Metadata {
         self.sample_ranges.iter().map(|range| u64::from(range.count)).sum()
     }
 
-    /// Stores everything as attributes of `image`.
+    /// Stores everything as attributes of `image`, in place of what it says of another render.
     pub fn store(&self, image: &mut Image) {
+        // Not every render has these.
+        for name in ["fenestra.seed", "fenestra.ahead", "fenestra.candidates"] {
+            image.attributes.remove(name);
+        }
+        image.attributes.retain(|name, _| !name.starts_with(PREFIX));
         let mut put = |name: &str, value: Attribute| {
             image.attributes.insert(name.to_owned(), value);
         };
