@@ -452,7 +452,7 @@ fn an_output_never_replaces_an_input() {
     let kept: Vec<_> = contents().collect();
     let guided = ["-o", "out.exr", "--sampler", "guided", "--save-guide", "./quad.obj"];
     let twice = ["-o", "n.exr", "--sampler", "guided", "--save-guide", "./n.exr"];
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 8] = [
         (&["-o", "m.exr"], "--output m.exr would replace m.exr, which is read"),
         (
             &["-o", "out.exr", "--stats", "scene.toml"],
@@ -463,6 +463,10 @@ fn an_output_never_replaces_an_input() {
         (&twice, "--save-guide ./n.exr would replace the file of --output"),
         (&["-o", "out.exr", "--stats", "out.exr"], "--stats out.exr would replace the file of"),
         (&["-o", "out.exr", "--png", "--stats", "out.png"], "--stats out.png would replace"),
+        (
+            &["-o", "out.exr", "--stats", "out.checkpoint.exr"],
+            "the checkpoint out.checkpoint.exr would replace the file of --stats",
+        ),
     ];
     for (options, message) in cases {
         let arguments = [&["render", "scene.toml", "--spp=2"], options].concat();
@@ -548,10 +552,12 @@ fn a_request_beyond_the_memory_limit_says_who_asks_for_how_much() {
     let shape = scene("mesh = \"quad.ply\"", "shape = \"sphere\"\nradius = 1.0\nsegments = 4096");
     let tree = scene("mesh = \"quad.ply\"", "shape = \"sphere\"\nradius = 1.0\nsegments = 1024");
     let film = ["--size=8000x8000"];
+    let groups = ["--size=8000x8000", "--aov=light-groups", "--sampler=mis"];
     // Software devices keep two copies.
-    let film_asks = if support::is_software() { "7" } else { "4" };
-    let film_asks = format!("a film of 8000x8000 pixels asks for {film_asks}");
-    let cases: [(&Folder, &str, &[&str], &str); 4] = [
+    let asks = if support::is_software() { ["7.2", "11.4"] } else { ["4.3", "7.2"] };
+    let [film_asks, groups_ask] =
+        asks.map(|asks| format!("a film of 8000x8000 pixels asks for {asks} GiB"));
+    let cases: [(&Folder, &str, &[&str], &str); 5] = [
         (
             &map,
             "1G",
@@ -561,6 +567,7 @@ fn a_request_beyond_the_memory_limit_says_who_asks_for_how_much() {
         (&shape, "300M", &[], "a shape asks for 4"),
         (&tree, "300M", &[], "the tree over 10"),
         (&scene("", ""), "1G", &film, &film_asks),
+        (&scene("", ""), "1G", &groups, &groups_ask),
     ];
     for (folder, limit, options, who) in cases {
         let limit = format!("--max-memory={limit}");

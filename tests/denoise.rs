@@ -123,6 +123,14 @@ fn pictures_are_denoised_before_they_are_cut_or_scaled() {
     assert_eq!(mark(&scaled), mark(&all));
     convert(&["shown.png"]);
     convert(&["shown.hdr"]);
+    // Noise that neighbours share stays: the picture of pixels that share none is taken where there is one.
+    let mut film = folder.image("in.exr");
+    film.insert_triple(["Unfiltered.R", "Unfiltered.G", "Unfiltered.B"], &[[2.0; 3]; 24 * 20]);
+    film.write_exr(&folder.path().join("in.exr")).unwrap();
+    convert(&["unfiltered.exr"]);
+    assert!(
+        folder.image("unfiltered.exr").channels["R"].iter().all(|red| (red - 2.0).abs() < 1e-3)
+    );
     assert!(image::open(folder.path().join("shown.png")).unwrap().width() == WIDTH);
 }
 

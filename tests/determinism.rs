@@ -190,6 +190,7 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
         let mut resumed = Session::new(support::device(), &scene, settings).unwrap();
         resumed.resume(&path).unwrap();
         assert_eq!(resumed.seconds(), stopped.seconds());
+        assert_eq!(resumed.renderer.ahead(), stopped.renderer.ahead());
         // A sweep may be stopped again.
         resumed.renderer.set_watch(Box::new(|wave| wave.is_training == 0));
         resumed.renderer.render_pass(1).unwrap();
@@ -199,6 +200,13 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
             renderer.render_pass(3).unwrap();
             assert!(renderer.sums().unwrap() == whole, "{} differs", sampler.name());
         }
+        // Light of a sweep that was stopped is light, though no pixel's sample is whole.
+        stopped.restart(7).unwrap();
+        stopped.renderer.set_watch(Box::new(|wave| wave.is_training == 0));
+        stopped.renderer.render_pass(1).unwrap();
+        let sums = stopped.sums().unwrap();
+        assert!(sums.sample_count == 0 && sums.mean(0)[1] > 0.0, "{:?}", sums.ahead);
+        assert_eq!(stopped.warnings(&scene), Vec::<String>::new());
     }
 }
 
@@ -249,6 +257,17 @@ fn a_run_by_time_ends_with_the_nearest_sample() {
         };
         assert_eq!([met(0.6), met(0.4), met(0.0)], [None, reason, Some(StopReason::Time)]);
     }
+}
+
+/// Samples of a seed have numbers of 32 bits.
+#[test]
+fn a_run_ends_with_the_last_sample_of_its_seed() {
+    let _alone = support::alone();
+    let settings = Settings { first_sample: u32::MAX - 3, ..settings(Sampler::Mis) };
+    let mut session = Session::new(support::device(), &scene(), settings).unwrap();
+    let rules = Rules { samples: Some(5), ..Rules::default() };
+    let reason = session.run(&rules, &mut |_: &Event<'_>| ()).unwrap();
+    assert_eq!((reason, session.renderer.sample_count()), (StopReason::LastSample, 3));
 }
 
 /// Who interrupts waits for no checkpoint and no look that is due.

@@ -507,8 +507,14 @@ fn merged_checkpoints_equal_one_run() {
     assert_eq!(other.metadata.candidates, Some(4));
     let mut second = second.clone();
     second.metadata.candidates = Some(1);
+    // Machines may differ too, and each has a name once.
+    second.metadata.device = "card".to_owned();
+    second.metadata.tracer = "device".to_owned();
     let mixed = merge_checkpoints(&[(a, &first), (b, &second)]).unwrap();
     assert_eq!(mixed.metadata.candidates, None);
+    let Metadata { device, driver, tracer, .. } = &mixed.metadata;
+    assert_eq!(device, "card + llvmpipe (LLVM 15, 256 bits) “ä”");
+    assert_eq!((driver.as_str(), tracer.as_str()), ("Mesa 22.3.6", "Embree 3.13.5 + device"));
     // Half the samples are no layer of a group of lights.
     let mut grouped = first.clone();
     let [sum, compensation] = [first.sums.sum.clone(), first.sums.compensation.clone()];

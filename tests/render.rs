@@ -126,6 +126,7 @@ fn a_render_continued_from_its_checkpoint_has_the_same_bits() {
     let (part, statistics) = render(&folder, "part.exr", &with(&["--spp", "9", "--resume"]));
     assert_eq!(statistics.samples_per_pixel, 9);
     assert_eq!(part.channels, whole.channels);
+    assert!(!folder.path().join("part.checkpoint.exr").exists(), "nothing is left to continue");
     let attribute = |name: &str| part.attributes[&format!("cryptomatte/3ae39a5/{name}")].clone();
     assert_eq!(attribute("name"), Attribute::Text("CryptoObject".into()));
     assert_eq!(attribute("conversion"), Attribute::Text("uint32_to_float32".into()));
