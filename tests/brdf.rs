@@ -6,6 +6,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use fenestra::{
     brdf::{MaterialTables, evaluate, fresnel, ggx},
+    math::colour::luminance,
     scene::material::{Anisotropy, MaterialKind, Principled},
     scene::measured::lookup::cosine_table,
     shader::{constants::*, structs},
@@ -276,6 +277,32 @@ fn principled_materials_follow_the_specification() {
         }
     }
     assert_eq!(seen, 14);
+}
+
+/// Coats of plastics are sampled as often as light is reflected by them, whatever the colour below.
+#[test]
+fn coats_are_sampled_by_their_share_of_the_light() {
+    let mut seen = 0;
+    for (case, converted) in cases().iter().zip(&tables().materials) {
+        let MaterialKind::Plastic { diffuse, .. } = case.material.kind else { continue };
+        for angle in ANGLES_DEG {
+            let cosine = outgoing(angle).z;
+            let at = |offset| {
+                let table = converted.table_offset + offset;
+                f64::from(cosine_table(&tables().words, table, 1, cosine))
+            };
+            let coat = at(0);
+            let base = f64::from(luminance(diffuse)) * (1.0 - coat);
+            let (share, expected) = (at(PLASTIC_SPECULAR_SHARE_OFFSET), coat / (coat + base));
+            let name = &case.material.name;
+            assert!(
+                (share / expected - 1.0).abs() < 0.02,
+                "{name} at {angle}°: {share}, {expected}"
+            );
+        }
+        seen += 1;
+    }
+    assert!(seen > 1);
 }
 
 /// Coloured textures replace the colour of a material but not its tables: values, samples and albedo

@@ -365,6 +365,12 @@ fn every_epoch_has_its_own_random_numbers() {
     let loaded = tag(0, &learned);
     assert_eq!(loaded, learned.epoch_tag());
     assert_eq!(tag(2, &GuideState { tag: loaded, ..learned }), loaded, "resumed");
+    renderer.restart(0).unwrap();
+    assert_eq!(
+        renderer.guide_state().unwrap().unwrap().tag,
+        0,
+        "who starts again went on from no guide"
+    );
 }
 
 #[test]

@@ -537,7 +537,46 @@ fn list_of(
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+    use std::path::Path;
+
     use super::*;
+    use crate::scene::light_group::LightGroups;
+
+    /// A box of 1 m far away, whose far side is seen too if it emits to both sides.
+    #[test]
+    fn draws_of_a_lamp_add_up_to_its_irradiance() {
+        const DRAWS: u32 = 1 << 14;
+        for (keys, sides) in [("", 1.0), ("emission_two_sided = true\n", 2.0)] {
+            let text = format!(
+                "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 40\n\
+                 [[material]]\nname = \"lamp\"\ntype = \"diffuse\"\nreflectance = [0, 0, 0]\n\
+                 emission = [3, 3, 3]\n{keys}[[object]]\nshape = \"box\"\nsize = [1, 1, 1]\n\
+                 material = \"lamp\"\n"
+            );
+            let scene = Scene::parse(Path::new("a.toml"), &text).unwrap();
+            let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
+            let tables = LampTables::new(&scene, &accel, &LightGroups::new(&scene));
+            let columns = 0..tables.source_count;
+            let cluster = Cluster { columns, power: tables.total, centre: None };
+            let survey = Survey {
+                accel: &accel,
+                tables: &tables,
+                passes: vec![false],
+                two_sided: vec![sides > 1.0],
+                radius: 1.0,
+                offset: accel.ray_offset(),
+            };
+            let irradiance = |draw| {
+                let numbers = hash_4d([draw, 1, 2, 3]);
+                f64::from(survey.light(&cluster, Vec3::new(0.0, 0.0, 100.0), numbers).irradiance)
+            };
+            let found = (0..DRAWS).map(irradiance).sum::<f64>() / f64::from(DRAWS);
+            let ratio = found / (3.0 * sides / 1e4);
+            assert!((ratio - 1.0).abs() < 0.06, "{sides} sides: {ratio}");
+        }
+    }
 
     #[test]
     fn every_cell_and_face_has_its_own_index() {

@@ -320,8 +320,8 @@ mod tests {
 
     use super::*;
 
-    /// The draws follow the power: of a triangle that emits to one side or two, and of spots, whose light
-    /// from the inner to the outer angle counts by half.
+    /// The draws follow the power: of a triangle that emits to one side or two, of spots, whose light from
+    /// the inner to the outer angle counts by half, and of directional lamps on the disc that hides all.
     #[test]
     fn lamps_are_drawn_by_their_power() {
         let square = |name: &str, keys: &str, x: f32| {
@@ -334,23 +334,25 @@ mod tests {
         let text = "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 40\n\
                     [[lamp]]\ntype = \"point\"\nposition = [0, 3, 0]\nintensity = [3, 3, 3]\n\
                     [[lamp]]\ntype = \"spot\"\nposition = [0, 3, 0]\ndirection = [0, -1, 0]\n\
-                    intensity = [12, 12, 12]\ninner_angle_deg = 0\nouter_angle_deg = 90\n"
+                    intensity = [12, 12, 12]\ninner_angle_deg = 0\nouter_angle_deg = 90\n\
+                    [[lamp]]\ntype = \"directional\"\ndirection = [0, -1, 0]\nirradiance = [4, 4, 4]\n"
             .to_owned()
             + &square("one", "", 0.0)
             + &square("two", "emission_two_sided = true", 4.0);
         let scene = Scene::parse(Path::new("a.toml"), &text).unwrap();
         let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
         let tables = LampTables::new(&scene, &accel, &LightGroups::new(&scene));
-        let mut drawn = [0.0; 4];
+        let mut drawn = [0.0; 5];
         for choice in &tables.choices {
             let index = match choice.source {
                 lamp if lamp & LAMP_BIT != 0 => lamp & !LAMP_BIT,
-                triangle => 2 + accel.triangle_materials[triangle as usize],
+                triangle => 3 + accel.triangle_materials[triangle as usize],
             };
             drawn[index as usize] += choice.probability;
         }
-        // Over π: 4 · 3; 2 · 12 · ½; 6 m² of each box, of one side or two.
-        let expected = [12.0, 12.0, 6.0, 12.0].map(|power| power / 42.0);
+        // Over π: 4 · 3; 2 · 12 · ½; 4 times the squared radius of 5 m × 1 m × 1 m; 6 m² of each box, of one
+        // side or two.
+        let expected = [12.0, 12.0, 27.0, 6.0, 12.0].map(|power| power / 69.0);
         for (drawn, expected) in drawn.into_iter().zip(expected) {
             assert!((drawn - expected).abs() < 1e-5, "{drawn}, expected {expected}");
         }

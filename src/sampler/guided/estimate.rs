@@ -169,3 +169,30 @@ impl Estimates {
 fn facing(normal: Vec3, region: &Region) -> f64 {
     ((normal.as_dvec3().dot(region.direction) + 0.25) / 1.25).max(0.03)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hit four times as bright as expected tells little of the other regions of its parent, less of those
+    /// of other parents, and more of its own.
+    #[test]
+    fn one_bright_hit_is_worth_one_of_nine() {
+        let tables =
+            RegionTables { shares: vec![0.25; 4], parents: vec![0, 0, 1, 1], facing: Vec::new() };
+        let prior = Estimate { visibility: 0.5, response: 1000.0 };
+        let parent = Estimates::new(vec![prior; 4]);
+        let mut tallies = [Tally::default(); 4];
+        tallies[0] = Tally { hits: 1.0, trials: 1.0, response: 4000.0 };
+        let found = Estimates::of_fine(tallies.iter().copied(), &parent, &tables);
+        // All together (4 + 1) / (1 + 1); the parent (4 + 8 · 2.5) / (1 + 8), the region itself once more.
+        let beside = 1000.0 * 24.0 / 9.0;
+        let expected = [(4000.0 + 8.0 * beside) / 9.0, beside, 2500.0, 2500.0];
+        for (estimate, expected) in found.regions.iter().zip(expected) {
+            assert!((estimate.response / expected - 1.0).abs() < 1e-5, "{found:?}");
+        }
+        // (1 + 1) / (0.5 + 1) of the visibility in the parent.
+        assert!((found.regions[1].visibility - 2.0 / 3.0).abs() < 1e-6, "{found:?}");
+        assert!((found.regions[3].visibility - 0.5).abs() < 1e-6, "{found:?}");
+    }
+}

@@ -159,7 +159,7 @@ impl Race<'_> {
         let (chosen, mut costs) = race(contenders.len(), |index, round, spread| {
             let mut round_work = Work::default();
             let mut block = spread.block_count();
-            for wave in self.waves(runner, progress, blocks, round) {
+            for wave in waves(runner.waves.capacity, progress, blocks, round, self.tag) {
                 let depth = runner.settings.depth;
                 let times = runner.run(&trials[index], wave, depth, false)?;
                 let paths = (wave.pixel_count * SAMPLES) as usize;
@@ -204,31 +204,33 @@ impl Race<'_> {
         log::info!("{} by measurement in {ms:.0} ms: {}", contenders[chosen], lines.join("; "));
         Ok((contenders[chosen], costs, ms))
     }
+}
 
-    /// Returns the waves of a round, as many as the buffers make necessary. No round has numbers of another
-    /// one, or of the picture.
-    fn waves(&self, runner: &Runner, progress: &Progress, blocks: Blocks, round: u32) -> Vec<Wave> {
-        let first_sample = progress.next_sample().wrapping_add(round * SAMPLES);
-        let start = round * (blocks.starts / MOST_ROUNDS).max(1) % blocks.starts;
-        let together = runner.waves.capacity / SAMPLES / BLOCK_PIXELS;
-        let wave = |first: u32| Wave {
-            first_pixel: (start + first * blocks.stride) * BLOCK_PIXELS,
-            pixel_count: together.min(blocks.count - first) * BLOCK_PIXELS,
-            first_sample,
-            sample_count: SAMPLES,
-            seed: progress.seed ^ TRAINING_SEED ^ MEASURING_SEED,
-            pixel_stride: 1,
-            block_stride: blocks.stride,
-            is_training: MEASURED_WAVE,
-            ..Wave::default()
-        };
-        let waves = (0..blocks.count).step_by(together as usize).map(wave);
-        waves.map(|wave| with_epoch(wave, first_sample, self.tag)).collect()
-    }
+/// Returns the waves of a round, as many as the buffers make necessary. No round has numbers of another
+/// one, or of the picture.
+fn waves(capacity: u32, progress: &Progress, blocks: Blocks, round: u32, tag: u32) -> Vec<Wave> {
+    let first_sample = progress.next_sample().wrapping_add(round * SAMPLES);
+    let start = round * (blocks.starts / MOST_ROUNDS).max(1) % blocks.starts;
+    let together = capacity / SAMPLES / BLOCK_PIXELS;
+    let wave = |first: u32| Wave {
+        first_pixel: (start + first * blocks.stride) * BLOCK_PIXELS,
+        pixel_count: together.min(blocks.count - first) * BLOCK_PIXELS,
+        first_sample,
+        sample_count: SAMPLES,
+        seed: progress.seed ^ TRAINING_SEED ^ MEASURING_SEED,
+        pixel_stride: 1,
+        block_stride: blocks.stride,
+        is_training: MEASURED_WAVE,
+        ..Wave::default()
+    };
+    let waves = (0..blocks.count).step_by(together as usize).map(wave);
+    waves.map(|wave| with_epoch(wave, first_sample, tag)).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     #[test]
@@ -240,6 +242,33 @@ mod tests {
         let block: Vec<PathState> = (0..BLOCK_PIXELS).map(path).collect();
         let (paths, width) = inside(&block);
         assert_eq!((paths.len(), width), (15, 5));
+    }
+
+    /// Waves of a round measure each of its blocks once, by samples that no other round has.
+    #[test]
+    fn rounds_have_samples_of_their_own() {
+        let progress = Progress { first_sample: 10, sample_count: 6, seed: 3 };
+        let blocks = Blocks::over(96 * 64, 12);
+        assert!(blocks.count > 4 && blocks.stride > 1, "several blocks, apart");
+        let mut samples = BTreeSet::new();
+        for round in 0..MOST_ROUNDS {
+            let waves = waves(4 * SAMPLES * BLOCK_PIXELS, &progress, blocks, round, 7);
+            let measured: BTreeSet<u32> = (waves.iter())
+                .flat_map(|wave| {
+                    let first = wave.first_pixel / BLOCK_PIXELS;
+                    (0..wave.pixel_count / BLOCK_PIXELS)
+                        .map(move |at| first + at * wave.block_stride)
+                })
+                .collect();
+            assert_eq!(measured.len(), blocks.count as usize, "{measured:?}");
+            assert!(measured.iter().all(|block| *block < 96), "{measured:?}");
+            let first = waves[0].first_sample;
+            assert!(
+                waves.iter().all(|wave| wave.first_sample == first && wave.sample_count == SAMPLES)
+            );
+            assert!((first..first + SAMPLES).all(|sample| samples.insert(sample)), "round {round}");
+        }
+        assert_eq!(samples.first(), Some(&16), "the next sample of the picture");
     }
 
     #[test]

@@ -323,6 +323,9 @@ mod tests {
     #[test]
     fn a_state_survives_a_file() {
         assert_eq!(read(&state().to_bytes().unwrap()).unwrap(), state());
+        // Who goes on from it and learns nothing new has other numbers than those it began with.
+        let tag = state().epoch_tag();
+        assert_ne!(GuideState { tag, ..state() }.epoch_tag(), tag);
     }
 
     #[test]
