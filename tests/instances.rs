@@ -107,6 +107,10 @@ fn check(name: &str, geometry: &Geometry, rays: &[Ray], free: usize, tolerance: 
     let two_levels = Accel::build(geometry, ONE_PAGE).unwrap();
     let one_level = Accel::build(&flat, ONE_PAGE).unwrap();
     assert!(two_levels.is_instanced() && !one_level.is_instanced());
+    // Boxes grow with the largest coordinates that instances reach, beside those of the ray.
+    let far = flat.positions.as_flattened().iter().fold(0.0, |far: f32, at| far.max(at.abs()));
+    let reach = two_levels.instances.iter().fold(1.5, |reach: f32, own| reach.max(own.reach));
+    assert!(reach >= far, "{name}: {reach} m of {far} m");
     check_host(name, &two_levels, &rays[..free]);
     let on_device = OnDevice::new(&two_levels);
     let found = on_device.trace(rays, Schedule::SINGLE);
@@ -558,11 +562,14 @@ fn rays_go_through_each_of_several_sheets() {
     scene.materials.push(sheet);
     let mut quad = Geometry::default();
     add_quad(&mut quad, Vec3::ZERO, [5e3 * Vec3::X, 5e3 * Vec3::NEG_Z], false);
+    let closed = quad.clone();
     quad.materials.fill(1);
-    scene.geometry.prototypes = vec![quad];
-    for (height, first_material, replaces) in [(8.0, 0, false), (9.0, 1, true), (10.0, 1, true)] {
+    scene.geometry.prototypes = vec![quad, closed];
+    for (height, mesh, first_material, replaces) in
+        [(8.0, 0, 0, false), (9.0, 0, 1, true), (10.0, 1, 1, true)]
+    {
         let place = Transform::new([1.0; 3], [0.0; 3], [0.0, height, 0.0]);
-        scene.geometry.instances.extend(Instance::new(0, &place, first_material, replaces));
+        scene.geometry.instances.extend(Instance::new(mesh, &place, first_material, replaces));
     }
     let settings = Settings { sampler: Sampler::Cosine, ..Settings::default() };
     // A ray that leaves the scene between two sheets is one in 10⁵.

@@ -239,3 +239,52 @@ impl<'a> Chances<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{film::Window, pass::film_buffers::position_in_film_order};
+
+    /// All pixels of a window, every fifth one, and those of every third block.
+    #[test]
+    fn paths_know_their_pixels() {
+        let window = Window { x: 5, y: 3, width: 21, height: 19 };
+        let parameters = [SceneParameters {
+            film_width: 40,
+            crop_x: 5,
+            crop_y: 3,
+            crop_width: 21,
+            ..SceneParameters::default()
+        }];
+        let words = bytemuck::cast_slice::<_, u32>(&parameters).iter();
+        let words: Vec<AtomicU32> = words.map(|word| AtomicU32::new(*word)).collect();
+        let whole = Wave { pixel_count: 9 * BLOCK_PIXELS, first_sample: 9, ..Wave::default() };
+        let strided = Wave { first_pixel: 2, pixel_count: 100, pixel_stride: 5, ..whole };
+        let measured = Wave {
+            first_pixel: BLOCK_PIXELS,
+            pixel_count: 3 * BLOCK_PIXELS,
+            block_stride: 3,
+            ..whole
+        };
+        let mut seen = [0; 3];
+        for (row, column) in (0..19).flat_map(|row| (0..21).map(move |column| (row, column))) {
+            let position = position_in_film_order(window, column, row);
+            let (block, within) = (position / BLOCK_PIXELS, position % BLOCK_PIXELS);
+            let places = [
+                Some(position),
+                (position % 5 == 2).then_some(position / 5),
+                (block % 3 == 1).then_some(block / 3 * BLOCK_PIXELS + within),
+            ];
+            for ((wave, place), seen) in
+                [whole, strided, measured].iter().zip(places).zip(&mut seen)
+            {
+                let Some(place) = place.filter(|place| *place < wave.pixel_count) else { continue };
+                let found =
+                    Chances::new(wave, &words, false).pixel_and_sample(wave.pixel_count + place);
+                assert_eq!(found, [40 * (3 + row) + 5 + column, 10], "{wave:?}");
+                *seen += 1;
+            }
+        }
+        assert!(seen[0] == 21 * 19 && seen[1] > 60 && seen[2] > 100, "{seen:?}");
+    }
+}
