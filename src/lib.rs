@@ -200,6 +200,7 @@
 //!   Conference on Geometric and Physical Modeling.
 
 #![warn(clippy::print_stderr, clippy::print_stdout)]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests may panic"))]
 
 // Pipeline order; rustfmt sorts within a group.
 pub mod brdf;

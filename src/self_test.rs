@@ -292,8 +292,6 @@ fn shadow_rays() -> (Vec<Hit>, Vec<ShadowRay>) {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
 
     /// The fault that a driver with a wrong answer is refused for.

@@ -185,8 +185,6 @@ fn crash(_status: ExitStatus) -> Option<&'static str> {
 
 #[cfg(all(test, unix))]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
 
     fn of(script: &str, longest: Duration) -> Verdict {

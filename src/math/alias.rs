@@ -69,8 +69,6 @@ pub fn probabilities(table: &[AliasEntry], scale: u64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
 
     #[test]

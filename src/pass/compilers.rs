@@ -110,8 +110,6 @@ pub(crate) fn compile(device: &Arc<Device>, list: &str) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
 
     #[test]

@@ -314,8 +314,6 @@ fn convert(lamp: &Lamp, groups: &LightGroups) -> structs::Lamp {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use std::path::Path;
 
     use super::*;

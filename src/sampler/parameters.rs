@@ -180,8 +180,6 @@ impl Parameters {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
     use crate::sampler::Sampler;
 

@@ -183,8 +183,6 @@ impl Entries {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use std::time::Duration;
 
     use super::*;

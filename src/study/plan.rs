@@ -433,8 +433,6 @@ fn default_contenders() -> Vec<Contender> {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
 
     fn plan(options: Options) -> Result<Plan> {

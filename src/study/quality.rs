@@ -214,8 +214,6 @@ fn over_seeds(
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
     use crate::session::Figures;
     use crate::study::{

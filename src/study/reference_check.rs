@@ -259,8 +259,6 @@ pub(super) fn read(path: &Path, scene: &Scene, reference: &Reference) -> Result<
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
 
     /// A picture of 64×48 pixels around 1 with noise of `spread`, `seed` its random numbers, times

@@ -118,8 +118,6 @@ pub(crate) fn mean_standard_error(errors: impl Iterator<Item = [f64; 3]>, filter
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
 
     #[test]

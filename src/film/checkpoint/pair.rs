@@ -156,8 +156,6 @@ impl Encoded {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
     use crate::film::{SampleRange, Sums, metadata::Metadata};
 

@@ -269,8 +269,6 @@ fn costs_of(runners: &mut [Runner], live: &[usize]) -> Option<Vec<(usize, f64)>>
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
     use crate::math::random::hash_4d;
 

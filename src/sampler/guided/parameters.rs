@@ -76,8 +76,6 @@ fn parse_bytes(text: &str) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use crate::sampler::{Parameters, Sampler};
 
     #[test]

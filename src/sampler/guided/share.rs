@@ -77,8 +77,6 @@ pub fn share_in_256ths(share: Option<f64>) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
 
     /// Counts of one cell after a million rays at a discrete integrand.

@@ -269,8 +269,6 @@ fn take<T: Pod>(words: &mut &[u32], count: usize) -> Vec<T> {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
 
     fn arm() -> Arm {

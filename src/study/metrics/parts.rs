@@ -94,8 +94,6 @@ fn denominators(reference: &MeanReference, is_inside: &[bool]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests may panic")]
-
     use super::*;
     use crate::study::metrics::Metrics;
 

@@ -1,5 +1,4 @@
 //! Summaries and curves of made-up runs with known answers.
-#![expect(clippy::unwrap_used, reason = "tests may panic")]
 
 use super::*;
 use crate::session::Figures;
