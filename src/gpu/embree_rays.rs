@@ -18,7 +18,7 @@ const FOLLOWED: c_int = -1;
 /// Segments of rays that are followed together, and what they meet: `RTCRayHit8`, with room for what later
 /// versions add to it, and our own at its end.
 #[repr(C, align(32))]
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Packet {
     origin: [Lanes<f32>; 3],
     /// Distance beyond which hits count.
@@ -46,23 +46,13 @@ impl Packet {
     /// Makes a packet without rays.
     pub(crate) fn new() -> Self {
         Self {
-            origin: [[0.0; LANES]; 3],
-            nearest: [0.0; LANES],
-            direction: [[0.0; LANES]; 3],
-            time: [0.0; LANES],
-            farthest: [0.0; LANES],
             // The mask lets rays meet all geometry.
             mask: [u32::MAX; LANES],
             lane: [0, 1, 2, 3, 4, 5, 6, 7],
-            flags: [0; LANES],
-            normal: [[0.0; LANES]; 3],
-            barycentric: [[0.0; LANES]; 2],
             primitive: [NOTHING; LANES],
             geometry: [NOTHING; LANES],
             instance: [[NOTHING; LANES]; 9],
-            followed: [0; LANES],
-            places: [0; LANES],
-            count: 0,
+            ..Self::default()
         }
     }
 
