@@ -39,7 +39,7 @@ pub(crate) struct Panel {
     /// True if a setting has changed since it was announced.
     pub(super) is_changed: bool,
     /// Failure between the waves of a pass, which cannot return it.
-    failure: Option<Error>,
+    pub(super) failure: Option<Error>,
 }
 
 impl Panel {
@@ -136,11 +136,6 @@ impl Panel {
         change(&mut self.tone);
         self.is_changed = true;
         self.present()
-    }
-
-    /// Returns the failure between the waves of the last pass.
-    pub(crate) fn take_failure(&mut self) -> Result<()> {
-        self.failure.take().map_or(Ok(()), Err)
     }
 
     /// Shows what the projector has. Fails if the device does or the window is gone.

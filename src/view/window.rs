@@ -30,7 +30,7 @@ use super::{
     panel::Panel,
     projector::Projector,
     side::Side,
-    worker::{Parts, Worker},
+    worker::Worker,
 };
 use crate::{
     error::{Error, Result},
@@ -379,8 +379,7 @@ fn render(
     let announce = Box::new(move |status| {
         let _ = proxy.send_event(Report::Status(Box::new(status)));
     });
-    let parts = Parts { scene, device: Arc::clone(&device), settings, spp, left, panel, announce };
-    let mut worker = Worker::new(parts);
+    let mut worker = Worker::new(scene, Arc::clone(&device), settings, spp, left, panel, announce);
     let result = worker.run();
     device.save_pipeline_cache();
     drop(worker);

@@ -50,11 +50,11 @@ impl Worker {
         match action {
             Action::Sampler(number) => self.choose_sampler(number)?,
             Action::Depth(more) => {
-                let depth = self.parts.settings.depth.saturating_add_signed(more).clamp(1, 64);
-                if depth != self.parts.settings.depth {
-                    self.parts.settings.depth = depth;
+                let depth = self.settings.depth.saturating_add_signed(more).clamp(1, 64);
+                if depth != self.settings.depth {
+                    self.settings.depth = depth;
                     self.keep_guide()?;
-                    self.parts.left = self.make_side(self.parts.left.sampler)?;
+                    self.left = self.make_side(self.left.sampler)?;
                     if self.right.take().is_some() {
                         self.right = Some(self.make_side(self.right_sampler)?);
                     }
@@ -74,9 +74,9 @@ impl Worker {
                 self.tell();
             }
             Action::Layer(_) | Action::NextLayer => {
-                let now = self.parts.panel.borrow().layer;
+                let now = self.panel.borrow().layer;
                 let at = LAYERS.iter().position(|(layer, ..)| *layer == now).unwrap_or(0);
-                self.parts.panel.borrow_mut().layer = match action {
+                self.panel.borrow_mut().layer = match action {
                     Action::Layer(layer) if layer != now => layer,
                     Action::Layer(_) => SHOW_PICTURE,
                     _ => LAYERS[(at + 1) % LAYERS.len()].0,
@@ -94,7 +94,7 @@ impl Worker {
                 return Ok(true);
             }
             Action::Bookmark => {
-                let [.., file] = names(&self.parts.scene.name);
+                let [.., file] = names(&self.scene.name);
                 let written = write_text(&file, &camera_toml(&self.rig.camera));
                 self.notice_written(written, &[file]);
             }
@@ -143,14 +143,14 @@ impl Worker {
 
     /// Focuses on the point that was clicked, once the whole film has samples there.
     pub(super) fn focus(&mut self) -> Result<()> {
-        if self.motion != Motion::Rest || self.is_stopped() || self.parts.left.sample_count() == 0 {
+        if self.motion != Motion::Rest || self.is_stopped() || self.left.sample_count() == 0 {
             return Ok(());
         }
         let Some(at) = self.clicked.take() else { return Ok(()) };
-        let film = self.parts.left.session.renderer.film_size;
-        let pixel = self.parts.panel.borrow().projector.pixel_under(at, film);
+        let film = self.left.session.renderer.film_size;
+        let pixel = self.panel.borrow().projector.pixel_under(at, film);
         let Some([x, y]) = pixel else { return Ok(()) };
-        let points = self.parts.left.points()?;
+        let points = self.left.points()?;
         match points.get((y * film[0] + x) as usize) {
             Some(Some(point)) => {
                 self.rig.focus(*point);
@@ -179,7 +179,7 @@ impl Worker {
                 self.notice = error.to_string();
             }
         }
-        self.views = views(&self.parts.scene.name);
+        self.views = views(&self.scene.name);
         self.tell();
     }
 
@@ -194,26 +194,26 @@ impl Worker {
             self.right_sampler = sampler;
             self.right = None;
             self.right = Some(self.make_side(sampler)?);
-        } else if sampler != self.parts.left.sampler {
+        } else if sampler != self.left.sampler {
             self.keep_guide()?;
-            self.parts.left = self.make_side(sampler)?;
+            self.left = self.make_side(sampler)?;
         }
         self.look(self.whole(), true)
     }
 
     /// Keeps what the left side has learned for the next renderer.
     fn keep_guide(&mut self) -> Result<()> {
-        self.guide = self.parts.left.session.renderer.guide()?.or(self.guide.take());
+        self.guide = self.left.session.renderer.guide()?.or(self.guide.take());
         Ok(())
     }
 
     fn make_side(&self, sampler: Sampler) -> Result<Side> {
-        let title = format!("{} | preparing {}", self.parts.scene.name, sampler.name());
-        (self.parts.announce)(self.status(title));
-        let settings = Settings { sampler, ..self.parts.settings.clone() };
-        let buffers = Some(self.parts.left.session.renderer.runner.scene.clone());
+        let title = format!("{} | preparing {}", self.scene.name, sampler.name());
+        (self.announce)(self.status(title));
+        let settings = Settings { sampler, ..self.settings.clone() };
+        let buffers = Some(self.left.session.renderer.runner.scene.clone());
         let guide = self.guide.as_deref();
-        let mut side = Side::new(&self.parts.device, &self.parts.scene, buffers, &settings, guide)?;
+        let mut side = Side::new(&self.device, &self.scene, buffers, &settings, guide)?;
         side.session.renderer.set_watch(self.watch());
         Ok(side)
     }
@@ -222,12 +222,12 @@ impl Worker {
         if self.shows_inset {
             if self.motion == Motion::Rest && !self.is_stopped() {
                 self.draw_inset()?;
-                self.parts.panel.borrow_mut().present()?;
+                self.panel.borrow_mut().present()?;
             }
         } else {
-            let mut panel = self.parts.panel.borrow_mut();
+            let mut panel = self.panel.borrow_mut();
             panel.projector.set_inset(&Inset::default())?;
-            if self.parts.left.sample_count() > 0 {
+            if self.left.sample_count() > 0 {
                 panel.present()?;
             }
         }
@@ -236,27 +236,27 @@ impl Worker {
 
     /// Draws what the pixel under the pointer has learned, into the inset.
     pub(super) fn draw_inset(&mut self) -> Result<()> {
-        let film = self.parts.left.session.renderer.film_size;
-        let panel = self.parts.panel.borrow();
+        let film = self.left.session.renderer.film_size;
+        let panel = self.panel.borrow();
         let pixel = panel.pointer.and_then(|at| panel.projector.pixel_under(at, film));
         drop(panel);
         let recorded = match pixel {
-            Some(pixel) => self.parts.left.session.renderer.inspect_pixel(pixel)?,
+            Some(pixel) => self.left.session.renderer.inspect_pixel(pixel)?,
             None => None,
         };
-        let drawn = recorded.and_then(|recorded| inset::draw(&self.parts.scene, recorded.as_ref()));
-        self.parts.panel.borrow_mut().projector.set_inset(&drawn.unwrap_or_default())
+        let drawn = recorded.and_then(|recorded| inset::draw(&self.scene, recorded.as_ref()));
+        self.panel.borrow_mut().projector.set_inset(&drawn.unwrap_or_default())
     }
 
     /// Writes the window, the film and the camera, and says where.
     pub(super) fn save(&mut self) -> Result<()> {
-        if self.parts.left.sample_count() == 0 {
+        if self.left.sample_count() == 0 {
             self.saves_at_rest = true;
             return Ok(());
         }
-        let (width, pixels) = self.parts.panel.borrow_mut().picture()?;
-        let film = self.parts.left.session.image(&[])?;
-        let files = names(&self.parts.scene.name);
+        let (width, pixels) = self.panel.borrow_mut().picture()?;
+        let film = self.left.session.image(&[])?;
+        let files = names(&self.scene.name);
         let written = write(&files, (width, &pixels), &film, &self.rig.camera);
         self.notice_written(written, &files);
         Ok(())

@@ -69,7 +69,17 @@ enum Motion {
 
 /// Everything that the rendering thread has.
 pub(crate) struct Worker {
-    parts: Parts,
+    scene: Scene,
+    /// The device, opened for the display.
+    device: Arc<Device>,
+    /// Settings of the first renderer.
+    settings: Settings,
+    /// Samples per pixel at which a film is finished.
+    spp: u32,
+    left: Side,
+    panel: Rc<RefCell<Panel>>,
+    /// Shows what the renderer does.
+    announce: Box<dyn Fn(Status)>,
     right: Option<Side>,
     /// Sampler of the right side when it is shown next.
     right_sampler: Sampler,
@@ -105,39 +115,29 @@ pub(crate) struct Worker {
     notice: String,
 }
 
-pub(super) struct Parts {
-    pub scene: Scene,
-    /// The device, opened for the display.
-    pub device: Arc<Device>,
-    /// Settings of the first renderer.
-    pub settings: Settings,
-    /// Samples per pixel at which a film is finished.
-    pub spp: u32,
-    /// Its side, made before the window was connected.
-    pub left: Side,
-    /// The window.
-    pub panel: Rc<RefCell<Panel>>,
-    /// Shows what the renderer does.
-    pub announce: Box<dyn Fn(Status)>,
-}
-
 impl Worker {
-    pub(crate) fn new(parts: Parts) -> Self {
-        let is_software = parts.device.capabilities().is_software();
-        let seed = parts.settings.seed;
+    /// Shows `scene` in the window of `panel`; the `left` side was made before that was connected.
+    pub(crate) fn new(
+        scene: Scene,
+        device: Arc<Device>,
+        settings: Settings,
+        spp: u32,
+        left: Side,
+        panel: Rc<RefCell<Panel>>,
+        announce: Box<dyn Fn(Status)>,
+    ) -> Self {
         let mut worker = Self {
-            rig: Rig::new(parts.scene.camera),
-            views: views(&parts.scene.name),
-            parts,
+            rig: Rig::new(scene.camera),
+            views: views(&scene.name),
             right: None,
             right_sampler: Sampler::Mis,
             chooses_right: false,
             guide: None,
             held: Vec3::ZERO,
             motion: Motion::Rest,
-            shrinking: if is_software { 8.0 } else { 2.0 },
+            shrinking: if device.capabilities().is_software() { 8.0 } else { 2.0 },
             looks: 0,
-            own_seed: Some(seed),
+            own_seed: Some(settings.seed),
             learned_at: Instant::now(),
             adapted_at: Instant::now(),
             learning_time: None,
@@ -150,15 +150,22 @@ impl Worker {
             denoising: Denoising::default(),
             clicked: None,
             notice: String::new(),
+            scene,
+            device,
+            settings,
+            spp,
+            left,
+            panel,
+            announce,
         };
         let watch = worker.watch();
-        worker.parts.left.session.renderer.set_watch(watch);
+        worker.left.session.renderer.set_watch(watch);
         worker
     }
 
     /// Attends to the window between the waves of a pass.
     fn watch(&self) -> Watch {
-        let panel = Rc::clone(&self.parts.panel);
+        let panel = Rc::clone(&self.panel);
         Box::new(move |_| {
             let mut panel = panel.borrow_mut();
             panel.attend() && !panel.is_moving
@@ -173,9 +180,9 @@ impl Worker {
         self.start_moving()?;
         let mut last = Instant::now();
         loop {
-            self.parts.panel.borrow_mut().attend();
-            self.parts.panel.borrow_mut().take_failure()?;
-            if std::mem::take(&mut self.parts.panel.borrow_mut().is_changed) {
+            self.panel.borrow_mut().attend();
+            self.panel.borrow_mut().failure.take().map_or(Ok(()), Err)?;
+            if std::mem::take(&mut self.panel.borrow_mut().is_changed) {
                 self.tell();
             }
             let now = Instant::now();
@@ -183,7 +190,7 @@ impl Worker {
             last = now;
             let mut moved = false;
             loop {
-                let Some(input) = self.parts.panel.borrow_mut().pending.pop_front() else { break };
+                let Some(input) = self.panel.borrow_mut().pending.pop_front() else { break };
                 match input {
                     Input::Close | Input::Key(Action::Quit) => return Ok(()),
                     input => moved |= self.apply(input)?,
@@ -199,16 +206,16 @@ impl Worker {
             } else if let Motion::Moving(since) = self.motion {
                 if since.elapsed() >= REST {
                     self.motion = Motion::Rest;
-                    self.parts.panel.borrow_mut().is_moving = false;
+                    self.panel.borrow_mut().is_moving = false;
                     self.look(self.whole(), true)?;
                 } else if !self.refine()? {
-                    self.parts.panel.borrow_mut().wait(REST / 4);
+                    self.panel.borrow_mut().wait(REST / 4);
                 }
             } else if self.is_stopped() {
                 // Input stopped a pass that nothing has started again.
                 self.look(self.whole(), true)?;
             } else if !self.refine()? {
-                self.parts.panel.borrow_mut().wait(Duration::from_secs(1));
+                self.panel.borrow_mut().wait(Duration::from_secs(1));
                 last = Instant::now();
             }
         }
@@ -220,12 +227,12 @@ impl Worker {
             self.denoising.start_moving();
         }
         self.motion = Motion::Moving(Instant::now());
-        self.parts.panel.borrow_mut().is_moving = true;
+        self.panel.borrow_mut().is_moving = true;
         self.move_on()
     }
 
     fn sides(&mut self) -> impl Iterator<Item = &mut Side> {
-        [Some(&mut self.parts.left), self.right.as_mut()].into_iter().flatten()
+        [Some(&mut self.left), self.right.as_mut()].into_iter().flatten()
     }
 
     fn is_stopped(&mut self) -> bool {
@@ -234,13 +241,13 @@ impl Worker {
 
     /// Width and height of the whole film.
     fn whole(&self) -> [u32; 2] {
-        [self.parts.scene.film.width, self.parts.scene.film.height]
+        [self.scene.film.width, self.scene.film.height]
     }
 
     /// Starts all films again through the camera of now.
     fn look(&mut self, size: [u32; 2], learns: bool) -> Result<()> {
         self.looks = self.looks.wrapping_add(1);
-        let [moved, ..] = hash_4d([self.parts.settings.seed, self.looks, MOVED_SEED, 0]);
+        let [moved, ..] = hash_4d([self.settings.seed, self.looks, MOVED_SEED, 0]);
         let own = if self.motion == Motion::Rest { self.own_seed.take() } else { None };
         let seed = own.unwrap_or(moved);
         self.error = None;
@@ -270,7 +277,7 @@ impl Worker {
             side.session.pass(1, f64::INFINITY)?;
         }
         if self.adapted_at.elapsed() >= ADAPT_INTERVAL {
-            self.rig.adapt(self.parts.left.points()?.into_iter().flatten());
+            self.rig.adapt(self.left.points()?.into_iter().flatten());
             self.adapted_at = Instant::now();
         }
         self.show()?;
@@ -285,7 +292,7 @@ impl Worker {
 
     /// Renders a pass of the side that had less time, and shows it. Returns false if all is done.
     fn refine(&mut self) -> Result<bool> {
-        let spp = self.parts.spp;
+        let spp = self.spp;
         let side = self
             .sides()
             .filter(|side| side.sample_count() < spp)
@@ -305,10 +312,10 @@ impl Worker {
 
     /// Takes over what the films show, and shows it.
     fn show(&mut self) -> Result<()> {
-        let layer = self.parts.panel.borrow().layer;
+        let layer = self.panel.borrow().layer;
         let is_due = self.looked_at.is_none_or(|at| at.elapsed() >= LOOK_INTERVAL);
-        if is_due && layer == SHOW_ERROR && self.parts.left.sample_count() > 0 {
-            let sums = self.parts.left.session.renderer.sums()?;
+        if is_due && layer == SHOW_ERROR && self.left.sample_count() > 0 {
+            let sums = self.left.session.renderer.sums()?;
             let mean = sums.means();
             let total: f64 = (0..sums.pixel_count()).map(|i| mean(i).iter().sum::<f64>()).sum();
             self.mean_radiance = (total / (3.0 * sums.pixel_count() as f64)) as f32;
@@ -321,14 +328,13 @@ impl Worker {
         self.look_at_error()?;
         let mean = self.mean_radiance;
         let denoises = layer == SHOW_PICTURE && self.denoises();
-        let mut panel = self.parts.panel.borrow_mut();
+        let mut panel = self.panel.borrow_mut();
         panel.has_right = self.right.is_some();
-        for (side, place) in
-            [(Some(&self.parts.left), Place::Left), (self.right.as_ref(), Place::Right)]
+        for (side, place) in [(Some(&self.left), Place::Left), (self.right.as_ref(), Place::Right)]
         {
             // A film without a sample goes on showing what was there before.
             if let Some(side) = side.filter(|side| side.sample_count() > 0) {
-                let has_ended = side.sample_count() >= self.parts.spp;
+                let has_ended = side.sample_count() >= self.spp;
                 let denoised =
                     if denoises { self.denoising.filter(side, place, has_ended)? } else { None };
                 match denoised {
@@ -352,11 +358,11 @@ impl Worker {
 
     /// Takes the error of the film at rest from its sums, from time to time and at its end.
     fn look_at_error(&mut self) -> Result<()> {
-        let has_ended = self.parts.left.sample_count() >= self.parts.spp;
+        let has_ended = self.left.sample_count() >= self.spp;
         let is_due = has_ended || self.error_at.elapsed() >= ERROR_INTERVAL;
-        let is_shown = self.parts.panel.borrow().projector.has_overlay();
-        if is_due && is_shown && self.motion == Motion::Rest && self.parts.left.sample_count() > 1 {
-            self.error = Some(self.parts.left.session.renderer.sums()?.relative_standard_error());
+        let is_shown = self.panel.borrow().projector.has_overlay();
+        if is_due && is_shown && self.motion == Motion::Rest && self.left.sample_count() > 1 {
+            self.error = Some(self.left.session.renderer.sums()?.relative_standard_error());
             self.error_at = Instant::now();
         }
         Ok(())
@@ -364,14 +370,14 @@ impl Worker {
 
     /// Tells title and controls what is shown.
     fn tell(&self) {
-        (self.parts.announce)(self.status(self.title()));
+        (self.announce)(self.status(self.title()));
     }
 
     /// State of everything that the controls show.
     fn status(&self, title: String) -> Status {
-        let samples = self.parts.left.sample_count();
+        let samples = self.left.sample_count();
         let share = 1.0 / f64::from(samples.max(1));
-        let times = &self.parts.left.session.renderer.totals().gpu_ms;
+        let times = &self.left.session.renderer.totals().gpu_ms;
         let mut pass_ms: Vec<(String, f64)> =
             times.iter().map(|(name, ms)| (name.clone(), ms * share)).collect();
         pass_ms.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -382,15 +388,15 @@ impl Worker {
         };
         Status {
             title,
-            sampler: if self.chooses_right { self.right_sampler } else { self.parts.left.sampler },
+            sampler: if self.chooses_right { self.right_sampler } else { self.left.sampler },
             is_split: self.right.is_some(),
-            depth: self.parts.settings.depth,
-            tone: self.parts.panel.borrow().tone,
+            depth: self.settings.depth,
+            tone: self.panel.borrow().tone,
             denoise: self.denoising.choice,
             speed: self.rig.speed,
             camera: self.rig.camera,
-            samples: [samples, self.parts.spp],
-            seconds: self.parts.left.session.seconds(),
+            samples: [samples, self.spp],
+            seconds: self.left.session.seconds(),
             error: self.error,
             pass_ms,
             views: self.views.iter().map(name).collect(),
@@ -404,11 +410,11 @@ impl Worker {
             let samples = side.sample_count();
             format!("{} {samples} spp {:.1} s", side.sampler.name(), side.session.seconds())
         };
-        let mut title = format!("{} | {}", self.parts.scene.name, describe(&self.parts.left));
+        let mut title = format!("{} | {}", self.scene.name, describe(&self.left));
         if let Some(right) = &self.right {
             title += &format!(" | {}", describe(right));
         }
-        let panel = self.parts.panel.borrow();
+        let panel = self.panel.borrow();
         if panel.layer != SHOW_PICTURE {
             let name =
                 LAYERS.iter().find(|(layer, ..)| *layer == panel.layer).map(|(_, name, _)| *name);
@@ -417,7 +423,7 @@ impl Worker {
         if self.motion != Motion::Rest {
             title += " | moving";
         }
-        let Settings { depth, .. } = self.parts.settings;
+        let Settings { depth, .. } = self.settings;
         title + &format!(" | depth {depth}, {:+.1} stops", panel.tone.exposure)
     }
 }
