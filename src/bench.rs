@@ -175,7 +175,7 @@ impl<'a> Bench<'a> {
 
     /// Runs one pass; seconds of the device, and of the host where it traces.
     fn run(&self, pass: &Pass) -> Result<f64> {
-        let host = self.scene.geometry.host_tracer();
+        let host = self.scene.geometry.host_tracer.as_ref();
         let mut recording = Recording::begin(self.device, 1, host, false)?;
         let sets = [&self.scene.set, &self.waves.set, &self.film_set];
         recording.add(pass, &sets, &self.wave)?;
@@ -240,7 +240,7 @@ pub fn measure(
 ) -> Result<Vec<RayRate>> {
     let mut bench = Bench::new(device, scene, plan)?;
     let yardstick = Yardstick::new(accel, plan.threads)?;
-    let (traversal, surfaces) = (scene.geometry.traversal(), scene.surfaces);
+    let (traversal, surfaces) = (scene.geometry.traversal, scene.surfaces);
     let incoherent = Schedule::incoherent(device.capabilities());
     let compare = |bench: &_, kind, kernel, any_hit| {
         compare(kind, &yardstick, bench, &Pass::new(device, kernel)?, any_hit, plan.repetitions)

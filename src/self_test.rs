@@ -193,7 +193,7 @@ impl Answers {
             ..Wave::default()
         };
         let schedule = Schedule::incoherent(device.capabilities());
-        let traversal = geometry.traversal();
+        let traversal = geometry.traversal;
         let [_, list_paths, _] = PASSES;
         let mut commands = Commands::begin(device)?;
         for (kernel, wave_set) in [

@@ -31,7 +31,8 @@ pub(crate) fn white(mut values: Vec<f32>, clipped: f32) -> f32 {
 /// A lat-long picture, half as high as wide.
 pub struct Sky {
     width: usize,
-    pixels: Vec<[u8; 3]>,
+    /// Display values, row by row from the top.
+    pub(crate) pixels: Vec<[u8; 3]>,
 }
 
 impl Sky {
@@ -54,11 +55,6 @@ impl Sky {
             (value(direction) * scale).to_array().map(display_from_linear)
         };
         Self { width, pixels: (0..width * height).map(show).collect() }
-    }
-
-    /// Display values, row by row from the top.
-    pub(crate) fn pixels(&self) -> &[[u8; 3]] {
-        &self.pixels
     }
 
     /// Draws a dot with a black rim.
@@ -101,7 +97,7 @@ mod tests {
     #[test]
     fn the_sky_is_bright_above_and_dark_below_the_horizon() {
         let white = Sky::new(64, Vec3::Y, 2.0, |_| Vec3::splat(2.0));
-        let pixel = |sky: &Sky, row: usize| sky.pixels()[64 * row + 20];
+        let pixel = |sky: &Sky, row: usize| sky.pixels[64 * row + 20];
         assert_eq!([pixel(&white, 0), pixel(&white, 12)], [[255; 3]; 2]);
         assert_eq!(pixel(&white, 16), HORIZON);
         assert_eq!(pixel(&white, 30), [display_from_linear(BELOW); 3]);
@@ -109,10 +105,10 @@ mod tests {
         let mut marked = white;
         marked.mark(Vec3::X.with_y(0.5), [1, 2, 3]);
         let row = ((0.5 - 0.5_f32.atan() / std::f32::consts::PI) * 32.0) as usize;
-        assert_eq!(marked.pixels()[64 * row + 48], [1, 2, 3]);
-        assert_eq!(marked.pixels()[64 * row + 44], [0; 3], "its rim");
+        assert_eq!(marked.pixels[64 * row + 48], [1, 2, 3]);
+        assert_eq!(marked.pixels[64 * row + 44], [0; 3], "its rim");
         // One behind goes on from one edge to the other.
         marked.mark(Vec3::Z.with_y(0.5), [4, 5, 6]);
-        assert_eq!([0, 63].map(|column| marked.pixels()[64 * row + column]), [[4, 5, 6]; 2]);
+        assert_eq!([0, 63].map(|column| marked.pixels[64 * row + column]), [[4, 5, 6]; 2]);
     }
 }

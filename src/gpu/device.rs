@@ -44,7 +44,8 @@ pub struct Device {
     capabilities: Capabilities,
     pub(super) physical: vk::PhysicalDevice,
     tracer: Tracer,
-    embree: Option<Arc<Embree>>,
+    /// The library by which the host traces, if it does.
+    pub(crate) embree: Option<Arc<Embree>>,
     pub(super) set_layouts: SetLayouts,
     pub(super) pipeline_cache: PipelineCache,
     pub(super) pipelines: Pipelines,
@@ -178,11 +179,6 @@ impl Device {
     /// Names what traces: "device" or "Embree 3.13.5".
     pub fn tracer(&self) -> String {
         tracer_name(self.embree.as_ref())
-    }
-
-    /// The library by which the host traces, if it does.
-    pub(crate) fn embree(&self) -> Option<&Arc<Embree>> {
-        self.embree.as_ref()
     }
 
     /// True if the device must not trace in the host's place.

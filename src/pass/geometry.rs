@@ -26,8 +26,10 @@ pub struct GeometryBuffers {
     /// The buffers at their bindings in the scene set. Missing pages repeat the first.
     pub bound: Vec<(Binding, Buffer)>,
     pages: Vec<Buffer>,
-    traversal: Traversal,
-    host_tracer: Option<HostTracer>,
+    /// Specialization of the passes that traverse this geometry.
+    pub traversal: Traversal,
+    /// The host's tracer, if the host traces.
+    pub host_tracer: Option<HostTracer>,
 }
 
 /// Largest number of bytes in one page of triangles on a device, such that one buffer holds the materials of
@@ -81,7 +83,7 @@ impl GeometryBuffers {
         accel: &Accel,
         passages: Option<Passages>,
     ) -> Result<Self> {
-        let Some(embree) = device.embree() else { return Ok(self) };
+        let Some(embree) = &device.embree else { return Ok(self) };
         let must_trace = device.must_trace_on_host();
         match HostTracer::new(embree, accel, &self.pages, passages, must_trace) {
             Ok(tracer) => {
@@ -94,16 +96,6 @@ impl GeometryBuffers {
             }
             Err(error) => Err(error),
         }
-    }
-
-    /// The host's tracer, if the host traces.
-    pub fn host_tracer(&self) -> Option<&HostTracer> {
-        self.host_tracer.as_ref()
-    }
-
-    /// Returns the specialization of the passes that traverse this geometry.
-    pub fn traversal(&self) -> Traversal {
-        self.traversal
     }
 }
 

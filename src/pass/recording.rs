@@ -15,7 +15,8 @@ use crate::{
 /// Passes over a wave, in their order.
 pub struct Recording<'a> {
     device: &'a Arc<Device>,
-    commands: Commands,
+    /// Commands before the next pass.
+    pub(super) commands: Commands,
     /// Passes of one submission, at most.
     most_passes: u32,
     times: PassTimes,
@@ -69,11 +70,6 @@ impl<'a> Recording<'a> {
         }
         pass.record(&mut self.commands, sets, wave, self.most_listed);
         Ok(true)
-    }
-
-    /// Commands before the next pass.
-    pub fn commands(&mut self) -> &mut Commands {
-        &mut self.commands
     }
 
     /// Submits, waits, and returns the time by pass, that of the host included.

@@ -24,7 +24,6 @@ use super::{
 };
 use crate::{
     error::Result,
-    film::Window,
     gpu::{Commands, DescriptorSet, Device, MOST_INVOCATIONS, PassTimes},
     scene::Camera,
     shader::structs::Wave,
@@ -49,19 +48,21 @@ pub struct Runner {
     pub(crate) scene: Arc<SceneBuffers>,
     pub(crate) waves: WaveBuffers,
     sharing: Option<DescriptorSet>,
-    film: FilmBuffers,
+    pub(crate) film: FilmBuffers,
     pub(crate) settings: PassSettings,
     passes: BTreeMap<Kernel, Pass>,
     /// Shadow rays per hit that fit the buffers.
     most_shadow_rays: u32,
     wave_paths: u32,
-    totals: Totals,
+    /// Counts and device times so far.
+    pub(crate) totals: Totals,
     /// Most that a counter of the device can hold since they were read.
     uncounted: u64,
     /// Milliseconds that the first use of each pass took, and the creation of all as `pipelines`.
     pub(crate) compile_ms: PassTimes,
     watch: Option<Watch>,
-    is_stopped: bool,
+    /// True if the watch has stopped a sweep since it was set, or since [`Runner::look`].
+    pub(crate) is_stopped: bool,
 }
 
 impl Runner {
@@ -91,7 +92,7 @@ impl Runner {
             device,
             window,
             settings.aovs,
-            &scene.light_groups.names()[..settings.light_groups as usize],
+            &scene.light_groups.names[..settings.light_groups as usize],
             settings.film_page_bytes,
             (waves.capacity / padded_pixels).max(1),
         )?;
@@ -116,20 +117,10 @@ impl Runner {
         })
     }
 
-    /// Keeps the samples of a part of the window alone.
-    pub(crate) fn keep(&mut self, window: Window) {
-        self.film.kept = window;
-    }
-
     /// Calls `watch` after the waves of all sweeps from now on.
     pub(crate) fn set_watch(&mut self, watch: Watch) {
         self.watch = Some(watch);
         self.is_stopped = false;
-    }
-
-    /// True if the watch has stopped a sweep since it was set, or since [`Runner::look`].
-    pub(crate) fn is_stopped(&self) -> bool {
-        self.is_stopped
     }
 
     /// Empties the film for another camera and film size. Fails if the device does.
@@ -220,7 +211,7 @@ impl Runner {
         wave: Wave,
     ) -> Result<()> {
         let pass = &self.passes[&self.accumulation()];
-        self.film.copy_edges(recording.commands(), wave.sample_count);
+        self.film.copy_edges(&mut recording.commands, wave.sample_count);
         for Range { start: first_pixel, end } in self.accumulated() {
             let film_start = self.film.first_pixel(first_pixel);
             let film = self.film.set(first_pixel);
@@ -273,7 +264,7 @@ impl Runner {
         let wave = Wave { film_start, ..wave };
         let settings = PassSettings { path_lists: self.path_lists(), ..self.settings };
         let order = wave_order(&settings, technique.steps(), wave, vertices);
-        let host = self.scene.geometry.host_tracer();
+        let host = self.scene.geometry.host_tracer.as_ref();
         let pages = if accumulates { self.accumulated().count() } else { 0 };
         let accumulation = self.accumulation();
         made(&mut self.passes, &self.device, accumulation)?;
@@ -359,20 +350,10 @@ impl Runner {
 
     /// Names what traces this scene, as [`Device::tracer`] does: the device where the host has no tree.
     pub(crate) fn tracer(&self) -> String {
-        match self.scene.geometry.host_tracer() {
+        match self.scene.geometry.host_tracer {
             Some(_) => self.device.tracer(),
             None => "device".to_owned(),
         }
-    }
-
-    /// The film on the device.
-    pub(crate) fn film(&self) -> &FilmBuffers {
-        &self.film
-    }
-
-    /// Counts and device times so far.
-    pub(crate) fn totals(&self) -> &Totals {
-        &self.totals
     }
 
     /// Device memory by buffer, bytes.

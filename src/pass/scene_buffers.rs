@@ -101,7 +101,7 @@ impl SceneBuffers {
         let surfaces = Surfaces {
             material_kinds,
             features: surfaces::features(&scene.materials)
-                | if geometry.traversal().is_instanced { SURFACES_INSTANCED } else { 0 }
+                | if geometry.traversal.is_instanced { SURFACES_INSTANCED } else { 0 }
                 | if lamp_cells.is_some() { SURFACES_LAMP_CELLS } else { 0 },
             lamp_count: lamps.source_count,
             access: textures.access,

@@ -84,9 +84,9 @@ impl<T: Tables> Technique for Piloted<T> {
             is_training: TRAINING_WAVE,
             ..Wave::default()
         };
-        runner.sweep(self, wave, runner.film().padded_pixels())?;
+        runner.sweep(self, wave, runner.film.padded_pixels())?;
         runner.take_counters()?;
-        if runner.is_stopped() {
+        if runner.is_stopped {
             return Ok(u32::MAX);
         }
         let start = Instant::now();

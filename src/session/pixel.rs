@@ -79,10 +79,10 @@ pub fn write(
     at: [u32; 2],
 ) -> Result<[PathBuf; 2]> {
     let path = picture_path(output, at);
-    let mut rows: Vec<[u8; 3]> = draw_rays(scene, explanation, WIDTH).pixels().to_vec();
+    let mut rows: Vec<[u8; 3]> = draw_rays(scene, explanation, WIDTH).pixels;
     for sky in explanation.skies(scene, WIDTH) {
         rows.extend(std::iter::repeat_n([255; 3], GAP * WIDTH));
-        rows.extend(sky.pixels());
+        rows.extend(&sky.pixels);
     }
     write_png(&path, WIDTH as u32, &rows)?;
     let numbers = path.with_extension("json");

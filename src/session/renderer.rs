@@ -29,7 +29,7 @@ fn light_group_count(settings: &Settings, groups: &LightGroups) -> Result<u32> {
     if !settings.aovs.contains(&Aov::LightGroups) {
         return Ok(0);
     }
-    let names = groups.names();
+    let names = &groups.names;
     let count = u32::try_from(names.len()).unwrap_or(u32::MAX);
     if count > MOST_LIGHT_GROUPS {
         return Err(Error::usage(format!(
@@ -97,7 +97,7 @@ impl Renderer {
             path_lists: settings.path_lists,
             cohort_edge,
             surfaces,
-            traversal: buffers.geometry.traversal(),
+            traversal: buffers.geometry.traversal,
             incoherent: Schedule::incoherent(device.capabilities()),
             film_page_bytes: settings.film_page_bytes,
             most_paths: most_paths(device.capabilities()),
@@ -107,7 +107,7 @@ impl Renderer {
         let attempt = |most_paths| -> Result<_> {
             let passes = PassSettings { most_paths, ..passes };
             let mut runner = Runner::new(device, Arc::clone(&buffers), passes, demand)?;
-            runner.keep(window);
+            runner.film.kept = window;
             let context = Context { scene, parameters: &settings.parameters, runner: &runner };
             let technique = settings.sampler.room().create(context)?;
             runner.warm_up(technique.as_ref())?;
@@ -150,7 +150,7 @@ impl Renderer {
             let progress = self.progress();
             let together = self.runner.samples_per_wave().clamp(1, left);
             let together = together.min(self.technique.learn(&mut self.runner, &progress)?);
-            if self.runner.is_stopped() {
+            if self.runner.is_stopped {
                 return Ok(());
             }
             let before = std::mem::take(&mut self.ahead);
@@ -164,7 +164,7 @@ impl Renderer {
                 ..Wave::default()
             };
             let wave = self.technique.complete(wave, &progress);
-            let pixels = self.runner.film().padded_pixels() - wave.first_pixel;
+            let pixels = self.runner.film.padded_pixels() - wave.first_pixel;
             let done = self.runner.sweep(self.technique.as_ref(), wave, pixels)?;
             if done < pixels {
                 let blocks = before.blocks + done / BLOCK_PIXELS;
@@ -175,7 +175,7 @@ impl Renderer {
                 self.sample_count += together;
                 left = left.saturating_sub(together);
             }
-            if self.runner.is_stopped() {
+            if self.runner.is_stopped {
                 return Ok(());
             }
         }
@@ -201,7 +201,7 @@ impl Renderer {
     pub fn restore(&mut self, sums: &Sums) -> Result<()> {
         let most_samples = sums.sample_count.saturating_add(u32::from(!sums.ahead.is_none()));
         self.technique.check_resume(most_samples, &self.progress())?;
-        let window = self.runner.film().kept;
+        let window = self.runner.film.kept;
         if sums.film_size != self.film_size
             || sums.origin != [window.x, window.y]
             || [sums.width, sums.height] != [window.width, window.height]
@@ -219,7 +219,7 @@ impl Renderer {
                 self.film_size
             )));
         }
-        self.runner.film().upload(sums)?;
+        self.runner.film.upload(sums)?;
         self.sample_count = sums.sample_count;
         self.ahead = sums.ahead;
         Ok(())
@@ -257,7 +257,7 @@ impl Renderer {
 
     /// Counts and device times so far.
     pub fn totals(&self) -> &Totals {
-        self.runner.totals()
+        &self.runner.totals
     }
 
     /// Figures of the technique.
@@ -281,9 +281,9 @@ impl Renderer {
 
     /// Reads the film. Fails if the device does.
     pub fn sums(&self) -> Result<Sums> {
-        let mut sums = self.runner.film().download()?;
+        let mut sums = self.runner.film.download()?;
         if !self.ahead.is_none() {
-            self.runner.film().download_radiance(&mut sums)?;
+            self.runner.film.download_radiance(&mut sums)?;
             sums.ahead = self.ahead;
             sums.clear_behind();
         }
@@ -317,7 +317,7 @@ impl Renderer {
 
     /// True if the watch has stopped a pass since [`Renderer::look`].
     pub fn is_stopped(&self) -> bool {
-        self.runner.is_stopped()
+        self.runner.is_stopped
     }
 
     /// Returns what the sampler has learned, as the content of a file; `None` for samplers that learn

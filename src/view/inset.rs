@@ -15,7 +15,7 @@ pub(super) const SIZE: [u32; 2] = [WIDTH as u32, (WIDTH + GAP) as u32];
 pub(super) fn draw(scene: &Scene, recorded: &dyn Explanation) -> Option<Inset> {
     let [visibility, density]: [Sky; 2] = recorded.skies(scene, WIDTH).try_into().ok()?;
     let opaque = |sky: &Sky| -> Vec<[u8; 4]> {
-        sky.pixels().iter().map(|[red, green, blue]| [*red, *green, *blue, 255]).collect()
+        sky.pixels.iter().map(|[red, green, blue]| [*red, *green, *blue, 255]).collect()
     };
     let gap = vec![[255; 4]; GAP * WIDTH];
     Some(Inset { size: SIZE, pixels: [opaque(&visibility), gap, opaque(&density)].concat() })

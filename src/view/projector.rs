@@ -94,7 +94,7 @@ impl Projector {
     ) -> Result<()> {
         let index = place as usize;
         let mut commands = Commands::begin(&self.device)?;
-        for (film, first_pixel, pixels) in renderer.runner.film().pages() {
+        for (film, first_pixel, pixels) in renderer.runner.film.pages() {
             for first_place in (0..pixels).step_by(MOST_INVOCATIONS as usize) {
                 let end_place = pixels.min(first_place + MOST_INVOCATIONS);
                 let constants = ShownFilm {

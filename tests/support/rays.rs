@@ -143,7 +143,7 @@ impl OnDevice {
         let device = super::device();
         let geometry = GeometryBuffers::new(device, accel).unwrap();
         let geometry = geometry.traced_by_host(device, accel, None).unwrap();
-        let host = geometry.host_tracer().is_some().then(|| ("host", Self::with(geometry)));
+        let host = geometry.host_tracer.is_some().then(|| ("host", Self::with(geometry)));
         if host.is_none() {
             eprintln!("not tested: there is no library by which the host traces (./setup)");
         }
@@ -177,7 +177,7 @@ impl OnDevice {
             (bindings::HITS, &hits),
             (bindings::HIT_INSTANCES, &instances),
         ];
-        let kernel = self.geometry.traversal().trace(schedule, Surfaces::default());
+        let kernel = self.geometry.traversal.trace(schedule, Surfaces::default());
         self.run(kernel, &own, wave(rays.len(), 0));
         hits.download(rays.len()).unwrap()
     }
@@ -196,7 +196,7 @@ impl OnDevice {
             (bindings::VISIBILITY, &visibility),
         ];
         let directions = (shadow_rays.len() / hits.len()) as u32;
-        let kernel = self.geometry.traversal().shadow(schedule, Surfaces::default());
+        let kernel = self.geometry.traversal.shadow(schedule, Surfaces::default());
         self.run(kernel, &own, wave(hits.len(), directions));
         visibility.download(shadow_rays.len()).unwrap()
     }
@@ -205,7 +205,7 @@ impl OnDevice {
         let device = super::device();
         let wave_set = set(&WAVE, own, &self.spare);
         let pass = Pass::new(device, kernel).unwrap();
-        let host = self.geometry.host_tracer();
+        let host = self.geometry.host_tracer.as_ref();
         let mut recording = Recording::begin(device, 1, host, false).unwrap();
         recording.add(&pass, &[&self.scene, &wave_set, &self.film], &wave).unwrap();
         recording.finish().unwrap();

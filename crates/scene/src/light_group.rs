@@ -12,7 +12,8 @@ pub const LAMPS: &str = "lamps";
 /// Names of the groups of a scene: that of the environment, then the others in their order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LightGroups {
-    names: Vec<String>,
+    /// Names of all.
+    pub names: Vec<String>,
 }
 
 impl LightGroups {
@@ -26,11 +27,6 @@ impl LightGroups {
         let names: BTreeSet<&str> = named.map(|name| name.as_deref().unwrap_or(LAMPS)).collect();
         let others = names.into_iter().filter(|name| *name != ENVIRONMENT);
         Self { names: [ENVIRONMENT].into_iter().chain(others).map(str::to_owned).collect() }
-    }
-
-    /// Names of all.
-    pub fn names(&self) -> &[String] {
-        &self.names
     }
 
     /// Place of the group of a light that names this one; that of the environment for a group without lights.

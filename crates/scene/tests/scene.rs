@@ -794,7 +794,7 @@ fn lamps_and_objects_name_groups_of_lights() {
     let lit = dark.replace("\"diffuse\"", "\"diffuse\"\nemission = [1, 1, 1]");
     let lamp = "[[lamp]]\ntype = \"point\"\nposition = [1, 2, 3]\nintensity = [4, 5, 6]\n\
                 light_group = \"key\"\n";
-    let groups = |text: &str| LightGroups::new(&load(&folder, text).unwrap()).names().to_vec();
+    let groups = |text: &str| LightGroups::new(&load(&folder, text).unwrap()).names;
     assert_eq!(groups(&dark), ["environment"]);
     assert_eq!(groups(&lit), ["environment", "lamps"]);
     let named = "light_group = \"bulbs 2\"\n";
@@ -954,7 +954,7 @@ fn an_included_file_names_the_group_of_its_lights() {
         let glow = with_box("").replace("\"diffuse\"", "\"diffuse\"\nemission = [1, 1, 1]");
         load(&folder, &format!("{glow}[[include]]\nfile = {include}\n")).unwrap()
     };
-    let groups = |scene: &Scene| LightGroups::new(scene).names().to_vec();
+    let groups = |scene: &Scene| LightGroups::new(scene).names;
     assert_eq!(groups(&scene("\"lamps.pbrt\"")), ["environment", "lamps"]);
     let named = scene("\"lamps.pbrt\"\nlight_group = \"ceiling\"");
     assert_eq!(groups(&named), ["environment", "ceiling", "lamps"]);

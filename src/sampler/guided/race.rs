@@ -97,7 +97,7 @@ struct Blocks {
 
 impl Blocks {
     fn of(runner: &Runner) -> Self {
-        Self::over(runner.film().padded_pixels(), runner.film().window.width.div_ceil(FILM_BLOCK))
+        Self::over(runner.film.padded_pixels(), runner.film.window.width.div_ceil(FILM_BLOCK))
     }
 
     /// The blocks of so many pixels in so many columns.
@@ -153,7 +153,7 @@ impl Race<'_> {
             .collect();
         trials.iter().try_for_each(|trial| runner.warm_up(trial))?;
         let blocks = Blocks::of(runner);
-        let pixels = f64::from(runner.film().padded_pixels());
+        let pixels = f64::from(runner.film.padded_pixels());
         let mut ms = vec![0.0; contenders.len()];
         let mut work = vec![Work::default(); contenders.len()];
         let (chosen, mut costs) = race(contenders.len(), |index, round, spread| {

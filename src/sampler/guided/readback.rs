@@ -69,7 +69,7 @@ impl Guided {
         [x, y]: [u32; 2],
         rays: u32,
     ) -> Result<Option<GuideReadback>> {
-        let window = runner.film().window;
+        let window = runner.film.window;
         let (column, row) = (x.wrapping_sub(window.x), y.wrapping_sub(window.y));
         assert!(column < window.width && row < window.height, "a pixel of the window");
         let per_group = runner.last_group_rays(self.steps());
@@ -87,7 +87,7 @@ impl Guided {
         let epoch = progress.first_sample.wrapping_add(self.rebuilt_at);
         let wave = Wave { is_training: 1, ..with_epoch(wave, epoch, self.tag) };
         runner.run(self, wave, 1, false)?;
-        runner.film().take_counters()?;
+        runner.film.take_counters()?;
 
         let waves = &runner.waves.set;
         let hits: Vec<Hit> = waves.buffer(wave::HITS).download(samples as usize)?;
@@ -96,7 +96,7 @@ impl Guided {
         let count = (samples * per_group) as usize;
         let shadow_rays: Vec<ShadowRay> = waves.buffer(wave::SHADOW_RAYS).download(count)?;
         let visible: Vec<u32> = waves.buffer(wave::VISIBILITY).download(count)?;
-        let targets = if self.is_guided() {
+        let targets = if self.choice.arm.is_guided {
             self.buffers.targets(count)?
         } else {
             vec![NOTHING_TO_LEARN; count]

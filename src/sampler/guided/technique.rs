@@ -66,7 +66,7 @@ impl Room for GuidedRoom {
         let settings = &runner.settings;
         let own = parameters.guided;
         let size = GuideSize {
-            pixels: runner.film().padded_pixels(),
+            pixels: runner.film.padded_pixels(),
             paths: runner.waves.capacity,
             shadow_rays: settings.shadow_rays.clamp(1, SHADOW_RAYS_PER_GROUP),
             has_bounces: own.guides_bounces(settings.depth),
@@ -89,8 +89,8 @@ impl Room for GuidedRoom {
 
 /// The arm in use, and why.
 #[derive(Clone, Debug)]
-struct Choice {
-    arm: Arm,
+pub(super) struct Choice {
+    pub(super) arm: Arm,
     /// Samples per pixel from which it is in use.
     since: u32,
     /// Races so far.
@@ -104,7 +104,7 @@ struct Choice {
 pub struct Guided {
     pub(super) buffers: GuideBuffers,
     arms: Arms,
-    choice: Choice,
+    pub(super) choice: Choice,
     /// Passes of the arm in use.
     steps: Box<dyn Steps>,
     /// The choice in the open scene that another camera saw.
@@ -154,11 +154,6 @@ impl Guided {
         Ok(has_moved)
     }
 
-    /// True if shadow rays follow what was learned.
-    pub(super) fn is_guided(&self) -> bool {
-        self.choice.arm.is_guided
-    }
-
     /// Forgets what was measured, and renders by `arm`.
     fn start_with(&mut self, arm: Arm) {
         self.choice = Choice::of(arm);
@@ -174,7 +169,7 @@ impl Guided {
     /// Races the arms if it is time. The guide must have been rebuilt just before, if it learns.
     fn choose(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
         let samples = progress.sample_count;
-        let pixels = runner.film().padded_pixels();
+        let pixels = runner.film.padded_pixels();
         while race_due(self.choice.races, pixels).0 <= samples {
             let axes = race_due(self.choice.races, pixels).1;
             self.choice.races += 1;
@@ -201,7 +196,7 @@ impl Guided {
 
     /// Trains on sweeps over parts of the film and finds out whether the scene is open.
     fn train(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
-        let pixels = runner.film().padded_pixels();
+        let pixels = runner.film.padded_pixels();
         let apart = pixels.div_ceil(MOST_TRAINING_PIXELS);
         let pixel_stride = TRAINING_SWEEPS * apart;
         for sweep in 0..TRAINING_SWEEPS {
@@ -215,16 +210,16 @@ impl Guided {
                 ..Wave::default()
             };
             let wave = with_epoch(wave, wave.first_sample, self.tag);
-            let before = runner.totals().clone();
+            let before = runner.totals.clone();
             runner.sweep(self, wave, pixels / pixel_stride)?;
             runner.take_counters()?;
-            if runner.is_stopped() {
+            if runner.is_stopped {
                 return Ok(());
             }
             // The first sweep samples only environment and BRDF: nothing is known yet. It is not in
             // the picture, so the picture does not depend on its own samples here.
-            let visible = runner.totals().shadow_rays_visible - before.shadow_rays_visible;
-            let traced = runner.totals().shadow_rays_traced - before.shadow_rays_traced;
+            let visible = runner.totals.shadow_rays_visible - before.shadow_rays_visible;
+            let traced = runner.totals.shadow_rays_traced - before.shadow_rays_traced;
             if sweep == 0 && visible as f64 > OPEN_SHARE * traced as f64 {
                 log::info!("{visible} of {traced} rays of the first sweep are visible: as mis");
                 self.is_open = true;
@@ -293,7 +288,7 @@ impl Technique for Guided {
         let samples = progress.sample_count;
         if !self.is_trained && !self.is_open {
             self.train(runner, progress)?;
-            if runner.is_stopped() {
+            if runner.is_stopped {
                 return Ok(u32::MAX);
             }
         } else if self.choice.arm.is_guided
@@ -305,7 +300,7 @@ impl Technique for Guided {
         if !self.choice.arm.is_guided || self.rebuilt_at == samples {
             self.choose(runner, progress)?;
         }
-        let pixels = runner.film().padded_pixels();
+        let pixels = runner.film.padded_pixels();
         let next = race_due(self.choice.races, pixels).0.max(samples + 1) - samples;
         let is_guided = self.choice.arm.is_guided;
         Ok(if is_guided { next.min(guide_schedule(samples + 1) - samples) } else { next })

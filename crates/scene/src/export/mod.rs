@@ -83,7 +83,7 @@ fn left_out(scene: &Scene) -> Vec<String> {
     }
     let groups = LightGroups::new(scene);
     let is_named = |name: &&String| ![ENVIRONMENT, LAMPS].contains(&name.as_str());
-    if let Some(first) = groups.names().iter().find(is_named) {
+    if let Some(first) = groups.names.iter().find(is_named) {
         warnings.push(format!(
             "light groups: left out, `{first}` among them; the picture does not depend on them"
         ));
