@@ -72,11 +72,9 @@ fn vertical_fov_deg(entity: &Entity, aspect: f64, log: &mut Log) -> Result<f64> 
     if !(fov > 0.0 && fov < 180.0) {
         return Err(entity.error(format!("expected a `fov` from 0 to 180 degrees, found {fov}")));
     }
-    if let Some(own) = entity.optional("frameaspectratio")?
-        && (own - aspect).abs() > 1e-3 * aspect
-        && let Some(parameter) = entity.find("frameaspectratio")
-    {
-        log.ignore(features::PBRT_ASPECT, &parameter.place);
+    let own = entity.optional("frameaspectratio")?;
+    if own.is_some_and(|own| (own - aspect).abs() > 1e-3 * aspect) {
+        log.ignore(features::PBRT_ASPECT, entity.place_of("frameaspectratio"));
     }
     let mut height = if aspect >= 1.0 { 1.0 } else { 1.0 / aspect };
     if let [left, right, bottom, top] = *entity.numbers("screenwindow", Kind::Float)? {
@@ -87,10 +85,8 @@ fn vertical_fov_deg(entity: &Entity, aspect: f64, log: &mut Log) -> Result<f64> 
         if height <= 0.0 {
             return Err(entity.error("expected a `screenwindow` with a height above 0"));
         }
-        if !(is_centred && is_square)
-            && let Some(parameter) = entity.find("screenwindow")
-        {
-            log.ignore(features::PBRT_SCREEN_WINDOW, &parameter.place);
+        if !(is_centred && is_square) {
+            log.ignore(features::PBRT_SCREEN_WINDOW, entity.place_of("screenwindow"));
         }
     }
     let tangent = (0.5 * fov).to_radians().tan() * height;
@@ -123,10 +119,8 @@ fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, 
             log.ignore_named(features::PBRT_SENSOR, &name, &sensor.place);
         }
         for name in ["whitebalance", "maxcomponentvalue", "cropwindow", "pixelbounds"] {
-            if let Some(parameter) = entity.find(name) {
-                let name = format!("`{name}` of the film");
-                log.ignore_named(features::PBRT_FILM, &name, &parameter.place);
-            }
+            let part = format!("`{name}` of the film");
+            log.ignore_named(features::PBRT_FILM, &part, entity.place_of(name));
         }
         // No part of the picture.
         entity.without_effect("filename savefp16 diagonal coordinatesystem");

@@ -167,9 +167,7 @@ impl Lights {
         exposure: f32,
         textures: &mut Textures,
     ) -> Result<()> {
-        if let Some(portal) = entity.find("portal") {
-            textures.log.ignore(features::PBRT_PORTAL, &portal.place);
-        }
+        textures.log.ignore(features::PBRT_PORTAL, entity.place_of("portal"));
         let Some(file) = entity.string("filename")? else {
             // A hemisphere of radiance 1 gives an illuminance of π.
             let factor = scale * illuminance.map_or(1.0, |illuminance| illuminance / PI);

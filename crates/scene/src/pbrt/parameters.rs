@@ -264,6 +264,11 @@ impl Entity {
         found.inspect(|parameter| parameter.used.set(true))
     }
 
+    /// Place of a parameter, if it is given.
+    pub(super) fn place_of(&self, name: &str) -> Option<&Place> {
+        self.find(name).map(|parameter| &parameter.place)
+    }
+
     /// Parameter with this name, which must be of one of these types.
     pub(super) fn find_of(&self, name: &str, kinds: &[Kind]) -> Result<Option<&Parameter>> {
         let Some(found) = self.find(name) else { return Ok(None) };
@@ -377,13 +382,21 @@ impl<'a> Log<'a> {
         Self { main, folder, ignored: Ignored::default(), inputs, warnings }
     }
 
-    pub(super) fn ignore(&mut self, feature: Feature, place: &Place) {
+    pub(super) fn ignore<'p>(&mut self, feature: Feature, place: impl Into<Option<&'p Place>>) {
         self.ignore_named(feature, feature.name, place);
     }
 
-    pub(super) fn ignore_named(&mut self, feature: Feature, name: &str, place: &Place) {
+    /// Counts a part, if it has a place: that of a parameter, say, that may be given.
+    pub(super) fn ignore_named<'p>(
+        &mut self,
+        feature: Feature,
+        name: &str,
+        place: impl Into<Option<&'p Place>>,
+    ) {
         let main = self.main;
-        self.ignored.add_named(feature, name, || place.describe(main));
+        if let Some(place) = place.into() {
+            self.ignored.add_named(feature, name, || place.describe(main));
+        }
     }
 
     /// Counts the parameters of a directive that nothing has asked for.

@@ -36,9 +36,7 @@ pub(super) fn mesh(entity: &Entity, strands: &mut Detail, log: &mut Log) -> Resu
             // pbrt does not read them.
             mesh.colors.clear();
             for name in ["displacement", "displacement.edgelength"] {
-                if let Some(parameter) = entity.find(name) {
-                    log.ignore(features::PBRT_DISPLACEMENT, &parameter.place);
-                }
+                log.ignore(features::PBRT_DISPLACEMENT, entity.place_of(name));
             }
             log.inputs.push(path);
             mesh
@@ -46,9 +44,8 @@ pub(super) fn mesh(entity: &Entity, strands: &mut Detail, log: &mut Log) -> Resu
         "loopsubdiv" => {
             let positions = positions(entity)?;
             let triangles = groups(entity, positions.len())?;
-            if let Some(scheme) = entity.find("scheme") {
-                log.ignore_named(features::PBRT_PARAMETER, "parameter `scheme`", &scheme.place);
-            }
+            let scheme = entity.place_of("scheme");
+            log.ignore_named(features::PBRT_PARAMETER, "parameter `scheme`", scheme);
             let levels = entity.number("levels", 3.0)?;
             subdivide(&positions, triangles, levels as i64)
                 .map_err(|message| entity.error(message))?
@@ -116,9 +113,8 @@ fn attribute<const N: usize>(
 fn triangle_mesh(entity: &Entity, log: &mut Log) -> Result<Mesh> {
     let positions = positions(entity)?;
     let count = positions.len();
-    if let Some(tangents) = entity.find("S") {
-        log.ignore_named(features::PBRT_PARAMETER, "tangents `S` of meshes", &tangents.place);
-    }
+    let tangents = entity.place_of("S");
+    log.ignore_named(features::PBRT_PARAMETER, "tangents `S` of meshes", tangents);
     // They number faces for Ptex alone.
     entity.find("faceIndices");
     Ok(Mesh {
@@ -136,11 +132,9 @@ fn quadric(entity: &Entity, log: &mut Log) -> Result<Mesh> {
         return Err(entity.error(format!("expected a radius above 0, found {radius}")));
     }
     let mut partial = |name: &str, whole: f64| -> Result<()> {
-        if entity.number(name, whole)? != whole
-            && let Some(parameter) = entity.find(name)
-        {
-            let name = format!("`{name}` of {}", entity.label());
-            log.ignore_named(features::PBRT_PARTIAL, &name, &parameter.place);
+        if entity.number(name, whole)? != whole {
+            let part = format!("`{name}` of {}", entity.label());
+            log.ignore_named(features::PBRT_PARTIAL, &part, entity.place_of(name));
         }
         Ok(())
     };
@@ -239,9 +233,7 @@ fn bilinear_mesh(entity: &Entity, log: &mut Log) -> Result<Mesh> {
     let normals: Vec<[f32; 3]> = attribute(entity, "N", Kind::Triple, count, log)?;
     let uvs: Vec<[f32; 2]> = attribute(entity, "uv", Kind::Pair, count, log)?;
     entity.find("faceIndices");
-    if let Some(parameter) = entity.find("emissionfilename") {
-        log.ignore(features::PBRT_EMISSION_IMAGE, &parameter.place);
-    }
+    log.ignore(features::PBRT_EMISSION_IMAGE, entity.place_of("emissionfilename"));
     if patches.len().saturating_mul(2 * (PATCH_CELLS * PATCH_CELLS) as usize) > MAX_TRIANGLES {
         let message = format!("{} patches, more than can be cut into triangles", patches.len());
         return Err(entity.error(message));
