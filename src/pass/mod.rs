@@ -12,7 +12,6 @@ pub mod host_tracer;
 pub mod kernel;
 pub(crate) mod lamp_cells;
 pub mod lamps;
-mod mattes;
 pub mod order;
 mod passages;
 pub mod recording;

@@ -8,7 +8,6 @@ use super::{
     geometry::{GeometryBuffers, triangle_page_bytes},
     lamp_cells::LampCells,
     lamps::LampTables,
-    mattes::Mattes,
     passages::Passages,
     surfaces::{self, Surfaces},
     texture_buffers::TextureBuffers,
@@ -17,7 +16,10 @@ use crate::{
     accel::{Accel, attributes::TriangleAttributes},
     brdf::MaterialTables,
     error::{Error, Result},
-    film::Window,
+    film::{
+        Window,
+        cryptomatte::{self, NAMELESS},
+    },
     gpu::{Buffer, DescriptorSet, Device},
     scene::{
         Camera, EnvironmentMap, Filter, Scene, environment::EnvironmentTables,
@@ -252,5 +254,39 @@ fn with_camera(parameters: SceneParameters, camera: &Camera) -> SceneParameters 
         camera_tan_half_fov: (0.5 * camera.vertical_fov_deg).to_radians().tan(),
         camera_forward: forward.into(),
         ..parameters
+    }
+}
+
+/// Identifiers of Cryptomatte for a scene, as the pass `mattes` reads them.
+struct Mattes {
+    /// By triangle in BVH order; those of meshes that instances place mean nothing.
+    triangle_objects: Vec<u32>,
+    /// By instance in the order of the scene.
+    instance_objects: Vec<u32>,
+    /// By material.
+    materials: Vec<u32>,
+}
+
+impl Mattes {
+    fn new(scene: &Scene, accel: &Accel) -> Self {
+        let geometry = &scene.geometry;
+        let nameless = cryptomatte::identifier(NAMELESS);
+        // Hash each name once.
+        let starts: Vec<u32> =
+            geometry.objects.iter().map(|start| cryptomatte::identifier(&start.name)).collect();
+        let of = |next: usize| next.checked_sub(1).map_or(nameless, |start| starts[start]);
+        let of_triangle = |&triangle: &u32| {
+            let triangle = triangle as usize;
+            of(geometry.objects.partition_point(|start| start.first_triangle <= triangle))
+        };
+        let of_instance = |instance: usize| {
+            of(geometry.objects.partition_point(|start| start.first_instance <= instance))
+        };
+        let materials = scene.materials.iter();
+        Self {
+            triangle_objects: accel.scene_triangles.iter().map(of_triangle).collect(),
+            instance_objects: (0..geometry.instances.len()).map(of_instance).collect(),
+            materials: materials.map(|own| cryptomatte::identifier(&own.name)).collect(),
+        }
     }
 }
