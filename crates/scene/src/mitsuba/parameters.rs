@@ -95,27 +95,23 @@ impl<'a> Parameters<'a> {
 
     /// First object of a kind, if there is one; the others count as unused.
     pub(super) fn object(&self, tag: &str) -> Result<Option<Node<'a>>> {
-        for child in self.node.children() {
-            let target = child.target()?;
-            if target.tag() == tag {
-                self.take(child);
-                return Ok(Some(target));
-            }
-        }
-        Ok(None)
+        self.of_tag(tag).next().transpose()
     }
 
     /// Objects of a kind (`bsdf`, `emitter`, …), references among them.
     pub(super) fn objects(&self, tag: &str) -> Result<Vec<Node<'a>>> {
-        let mut objects = Vec::new();
-        for child in self.node.children() {
-            let target = child.target()?;
-            if target.tag() == tag {
+        self.of_tag(tag).collect()
+    }
+
+    fn of_tag(&self, tag: &str) -> impl Iterator<Item = Result<Node<'a>>> {
+        let found = move |child: Node<'a>| match child.target() {
+            Ok(target) if target.tag() != tag => None,
+            target => {
                 self.take(child);
-                objects.push(target);
+                Some(target)
             }
-        }
-        Ok(objects)
+        };
+        self.node.children().filter_map(found)
     }
 
     /// Counts as used what changes nothing in the picture; `names` have spaces between them.
