@@ -14,7 +14,7 @@ use fenestra::{
     command::{self, compile, convert, render, study},
     film::{Attribute, Image, RgbImage},
     scene::{
-        load::{LoadOptions, arrays::Arrays},
+        load::{Arrays, LoadOptions},
         mesh::Mesh,
     },
     session::StopReason,

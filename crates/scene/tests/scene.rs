@@ -14,7 +14,7 @@ use fenestra_scene::{
     instance::Instance,
     lamp::{LampKind, Spot, SpotFalloff},
     light_group::LightGroups,
-    load::{LoadOptions, arrays::Arrays},
+    load::{Arrays, LoadOptions},
     material::{Anisotropy, ConductorFresnel, Emission, MaterialKind, Principled, Surface},
     mesh::Mesh,
     picture::{Image, RgbImage},
