@@ -13,13 +13,12 @@ use rayon::prelude::*;
 use super::{
     cache::{self, Cache},
     component::Component,
-    config,
+    config::{self, Method, check_count},
     expectation::maximize,
     fitted::{BrdfFit, BrdfSummary, BrdfView, Fit, view_theta},
     growth::grow,
     hemisphere::{HemisphereTarget, sample_hemisphere},
     judge::{FitErrors, judge_hemisphere},
-    options::{Method, check_count},
     points::PointSet,
     squared_error::minimize_squared_error,
 };

@@ -1,4 +1,8 @@
-//! Every number a fit depends on. A change here requires a new [`VERSION`].
+//! Every number a fit depends on, and its options. A change of a number requires a new [`VERSION`].
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
 
 /// Version of the fitting procedure and of the fit files; part of the cache key.
 pub(crate) const VERSION: u32 = 2;
@@ -58,3 +62,22 @@ pub(crate) const FOLLOWING_BANDWIDTH: f64 = 20.0;
 /// Largest angle between normal and view, degrees, in summary figures. Grazing views are listed
 /// separately.
 pub(crate) const SUMMARY_ANGLE_DEG: f64 = 60.0;
+
+/// Objective of a fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Kullback-Leibler divergence, by expectation maximization: suits a sampling density.
+    #[default]
+    Em,
+    /// Squared error, by projected L-BFGS from the result of `em`: the fits of \[Tsai et al. 2008\].
+    L2,
+}
+
+/// Checks that a number, such as that of lobes, is from 1 to `most`.
+pub(crate) fn check_count(count: usize, what: &str, most: usize) -> Result<()> {
+    if (1..=most).contains(&count) {
+        return Ok(());
+    }
+    Err(Error::usage(format!("{count} {what} asked for; expected 1 to {most}")))
+}

@@ -8,12 +8,11 @@ use super::{
     cache::{self, Cache},
     colour::{divergence_colours, least_squares_colours},
     component::{Component, kernel_integral},
-    config,
+    config::{self, Method, check_count},
     fitted::{EnvironmentFit, EnvironmentLobe, Fit},
     grid::{ColouredPatch, Grid, patch_count},
     growth::grow,
     judge::{FitErrors, judge_environment},
-    options::{Method, check_count},
     points::{Patch, PointSet},
     squared_error::minimize_squared_error,
 };

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     component::{Component, lobe_energy},
+    config::Method,
     judge::{ColouredComponent, FitErrors},
-    options::Method,
 };
 use crate::srbf::Lobe;
 

@@ -23,7 +23,6 @@ pub mod grid;
 pub(crate) mod growth;
 pub mod hemisphere;
 pub mod judge;
-pub mod options;
 pub mod picture;
 pub mod points;
 pub mod report;
@@ -32,7 +31,7 @@ pub mod squared_error;
 
 pub use brdf::{BrdfOptions, brdf_lobes};
 pub use cache::{Cache, read_fit, write_fit};
+pub use config::Method;
 pub use environment::{EnvironmentOptions, environment_lobes};
 pub use fitted::{BrdfFit, EnvironmentFit, EnvironmentLobe, Fit};
-pub use options::Method;
 pub use report::describe;

@@ -6,10 +6,9 @@ use serde_json::{Value, json};
 
 use super::{
     cache::read_fit,
-    config,
+    config::{self, Method},
     fitted::{BrdfFit, EnvironmentFit, Fit},
     judge::FitErrors,
-    options::Method,
 };
 use crate::error::Result;
 
