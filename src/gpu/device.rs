@@ -18,8 +18,7 @@ use super::{
     embree::Embree,
     instance::Instance,
     lavapipe,
-    pipeline_cache::PipelineCache,
-    pipelines::Pipelines,
+    pipelines::{PipelineCache, Pipelines},
     set_layouts::SetLayouts,
 };
 use crate::error::{Error, Result};

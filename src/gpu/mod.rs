@@ -17,7 +17,6 @@ pub(crate) mod labels;
 pub(crate) mod lavapipe;
 mod library;
 pub mod pipeline;
-mod pipeline_cache;
 mod pipelines;
 mod set_layouts;
 pub(crate) mod swapchain;
