@@ -6,7 +6,6 @@
 
 pub mod pixel;
 mod progress;
-mod rate;
 mod renderer;
 mod run;
 mod settings;

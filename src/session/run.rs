@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Flag, Renderer, Rules, Settings, Standing, StopReason, rate::Rate};
+use super::{Flag, Renderer, Rules, Settings, Standing, StopReason, stop::Rate};
 use crate::{
     error::{Error, Result},
     film::{
