@@ -4,9 +4,8 @@
 use super::{
     geometry::{Schedule, Traversal},
     kernel::{Dispatch, Domain, Kernel},
-    roulette::Roulette,
     sharing::{Moment, Sharing},
-    steps::Steps,
+    steps::{Roulette, Steps},
     surfaces::Surfaces,
 };
 use crate::shader::{
