@@ -6,7 +6,6 @@
 
 mod curves;
 mod html;
-mod overhead;
 mod pictures;
 mod plot;
 mod tables;
@@ -63,7 +62,7 @@ pub fn write(report: &Report, folder: &Folder) -> Result<()> {
             }
         }
     }
-    body += &overhead::overhead_section(report);
+    body += &curves::overhead_section(report);
     body += &end(report);
     let page = include_str!("page.html")
         .replace("{{title}}", &escape(&report.title))
