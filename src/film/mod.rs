@@ -8,7 +8,6 @@ pub mod checkpoint;
 pub mod cryptomatte;
 pub mod denoised;
 pub mod display;
-mod group_sums;
 mod image;
 pub mod layers;
 pub mod merge;
@@ -17,7 +16,6 @@ pub mod picture;
 pub(crate) mod reconstruction;
 pub mod sky;
 pub mod statistics;
-pub mod summary;
 pub mod sums;
 pub(crate) mod tone;
 
@@ -25,8 +23,7 @@ pub(crate) use self::tone::{Curve, Tone};
 pub use self::{
     checkpoint::Checkpoint,
     display::DisplayServer,
-    group_sums::GroupSums,
-    layers::Aov,
+    layers::{Aov, GroupSums},
     metadata::{Metadata, SampleRange},
     statistics::Statistics,
     sums::Sums,

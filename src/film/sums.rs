@@ -3,8 +3,7 @@
 use std::{array, collections::BTreeSet};
 
 use super::{
-    group_sums::GroupSums,
-    layers::{Aov, COUNTS, COVERAGES, Coverage, TRIPLES},
+    layers::{Aov, COUNTS, COVERAGES, Coverage, GroupSums, TRIPLES},
     reconstruction::{falloff, weights},
 };
 use crate::shader::constants::FILM_BLOCK;
