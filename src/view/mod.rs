@@ -6,7 +6,6 @@
 
 pub mod camera;
 mod controls;
-mod inset;
 pub mod keys;
 mod message;
 mod overlay;

@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use crate::{
     error::Result,
-    film::Tone,
+    film::{Tone, sky::Sky},
     gpu::{Buffer, Commands, DescriptorSet, Device, MOST_INVOCATIONS, Pipeline},
+    pass::Explanation,
+    scene::Scene,
     session::Renderer,
     shader::{
         bindings::{VIEW, view},
@@ -22,6 +24,12 @@ pub(crate) enum Place {
     Right,
 }
 
+/// Width of an inset, pixels, and height of the line between its pictures.
+const INSET_WIDTH: usize = 256;
+const INSET_GAP: usize = 2;
+/// Width and height of an inset, pixels.
+const INSET_SIZE: [u32; 2] = [INSET_WIDTH as u32, (INSET_WIDTH + INSET_GAP) as u32];
+
 /// A picture over the window.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Inset {
@@ -29,6 +37,20 @@ pub(crate) struct Inset {
     pub size: [u32; 2],
     /// Red, green, blue, each multiplied by the opacity, and this: row by row.
     pub pixels: Vec<[u8; 4]>,
+}
+
+impl Inset {
+    /// Draws what the pixel under the pointer has learned of the sky, visibility above density; `None` where
+    /// nothing was learned.
+    pub(super) fn of(scene: &Scene, recorded: &dyn Explanation) -> Option<Self> {
+        let [visibility, density]: [Sky; 2] = recorded.skies(scene, INSET_WIDTH).try_into().ok()?;
+        let opaque = |sky: &Sky| -> Vec<[u8; 4]> {
+            sky.pixels.iter().map(|[red, green, blue]| [*red, *green, *blue, 255]).collect()
+        };
+        let gap = vec![[255; 4]; INSET_GAP * INSET_WIDTH];
+        let pixels = [opaque(&visibility), gap, opaque(&density)].concat();
+        Some(Self { size: INSET_SIZE, pixels })
+    }
 }
 
 /// The controls over the window.
@@ -60,8 +82,8 @@ pub(crate) struct Projector {
 }
 
 impl Projector {
-    /// Makes room for films of up to `film` pixels and insets of up to `inset`. Fails if the device does.
-    pub(crate) fn new(device: &Arc<Device>, film: [u32; 2], inset: [u32; 2]) -> Result<Self> {
+    /// Makes room for films of up to `film` pixels and an inset. Fails if the device does.
+    pub(crate) fn new(device: &Arc<Device>, film: [u32; 2]) -> Result<Self> {
         let area = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
         let pipeline = |name| Pipeline::new(device, name, spirv::pass(name), &[]);
         let shown = |name| {
@@ -75,7 +97,7 @@ impl Projector {
             shown: [shown("shown")?, shown("shown right")?],
             film,
             sizes: [[1, 1]; 2],
-            inset: Buffer::zeroed(device, "inset", 4 * area(inset))?,
+            inset: Buffer::zeroed(device, "inset", 4 * area(INSET_SIZE))?,
             inset_size: [0, 0],
             overlay: Overlay::default(),
             window: None,

@@ -24,7 +24,6 @@ use winit::{
 
 use super::{
     controls::{self, Controls},
-    inset,
     keys::{Action, action_of},
     message::{Drag, Input, Status},
     panel::Panel,
@@ -372,7 +371,7 @@ fn render(
     let Options { device: wanted, tracer, validate, check, settings, spp, tone } = options;
     let display = window.display_handle().map_err(|error| no_window(&error))?.as_raw();
     let device = Device::open_checked(wanted.as_deref(), validate, tracer, Some(display), check)?;
-    let projector = Projector::new(&device, [scene.film.width, scene.film.height], inset::SIZE)?;
+    let projector = Projector::new(&device, [scene.film.width, scene.film.height])?;
     let left = Side::new(&device, &scene, None, &settings, None)?;
     let panel = Panel::new(&device, window, size, projector, inputs, tone)?;
     let panel = Rc::new(RefCell::new(panel));

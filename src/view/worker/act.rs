@@ -12,7 +12,6 @@ use crate::{
     shader::constants::SHOW_PICTURE,
     terminal::say,
     view::{
-        inset,
         keys::{Action, LAYERS},
         message::{Drag, Input, Setting},
         projector::Inset,
@@ -244,7 +243,7 @@ impl Worker {
             Some(pixel) => self.left.session.renderer.inspect_pixel(pixel)?,
             None => None,
         };
-        let drawn = recorded.and_then(|recorded| inset::draw(&self.scene, recorded.as_ref()));
+        let drawn = recorded.and_then(|recorded| Inset::of(&self.scene, recorded.as_ref()));
         self.panel.borrow_mut().projector.set_inset(&drawn.unwrap_or_default())
     }
 
