@@ -6,11 +6,12 @@
 //! other surfaces. Bounces are resampled by the result, so its errors cost precision only (Vorba et
 //! al. 2014 guide paths by learned light, fitted with mixtures of Gaussians).
 
-use std::ops::AddAssign;
-
 use rayon::prelude::*;
 
-use crate::sampler::{guided::cells::Tree, regions::FACE_COUNT};
+use crate::sampler::{
+    guided::cells::{Tree, adds},
+    regions::FACE_COUNT,
+};
 use crate::shader::rooms::guided::GUIDE_ARRIVAL_SIDE;
 
 /// Number of directions that a cell distinguishes.
@@ -41,12 +42,7 @@ struct Arrivals {
     light: f32,
 }
 
-impl AddAssign for Arrivals {
-    fn add_assign(&mut self, other: Self) {
-        self.rays += other.rays;
-        self.light += other.light;
-    }
-}
+adds!(Arrivals: rays light);
 
 impl Arrivals {
     /// Mean light of a ray, with a prior worth [`PRIOR_RAYS`].

@@ -7,6 +7,18 @@ use rayon::prelude::*;
 use crate::sampler::{guided::key::CellKey, regions::FACE_COUNT};
 use crate::shader::rooms::guided::{GUIDE_PROBES, GUIDE_REFINED, GUIDE_SHARE_SHIFT};
 
+/// Lets sums over cells add a struct field by field.
+macro_rules! adds {
+    ($of:ident: $($field:ident)*) => {
+        impl std::ops::AddAssign for $of {
+            fn add_assign(&mut self, other: Self) {
+                $(self.$field += other.$field;)*
+            }
+        }
+    };
+}
+pub(super) use adds;
+
 /// Upper bound of the number of cells, faces included: their index lies below [`GUIDE_REFINED`].
 pub const MAX_CELLS: usize = 1 << 22;
 

@@ -1,7 +1,6 @@
 //! Counts of visible rays: as they lie on the device and in files, in fixed point, and in rays.
 
-use std::ops::AddAssign;
-
+use super::cells::adds;
 use crate::shader::rooms::guided::GUIDE_COUNT_WORDS;
 
 /// Trials, hits and the sum of the responses of the hits, as they lie on the device and in files.
@@ -60,13 +59,7 @@ impl From<&Count> for Tally {
     }
 }
 
-impl AddAssign for Tally {
-    fn add_assign(&mut self, other: Self) {
-        self.hits += other.hits;
-        self.trials += other.trials;
-        self.response += other.response;
-    }
-}
+adds!(Tally: hits trials response);
 
 impl Tally {
     /// Visibility, with a prior worth `weight` rays.

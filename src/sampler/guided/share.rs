@@ -14,8 +14,7 @@
 //!
 //! Octave of the light of every visible ray, its c p_B / q → [`ShareEvidence`] → share in 256ths.
 
-use std::ops::AddAssign;
-
+use super::cells::adds;
 use crate::shader::rooms::guided::GUIDE_SHARE_OCTAVES;
 
 /// Words of the counts of one cell: for every octave of X from 2⁻³² on, the number of visible rays
@@ -63,12 +62,7 @@ impl ShareEvidence {
     }
 }
 
-impl AddAssign for ShareEvidence {
-    fn add_assign(&mut self, other: Self) {
-        self.rays += other.rays;
-        self.weighted += other.weighted;
-    }
-}
+adds!(ShareEvidence: rays weighted);
 
 /// Converts a share to 256ths as they lie on the device; 0 lets the material decide.
 pub fn share_in_256ths(share: Option<f64>) -> u32 {
