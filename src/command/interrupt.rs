@@ -11,7 +11,8 @@ use crate::{session::Flag, terminal::say};
 /// with status 130; another is noted for the caller, who writes what there is.
 #[derive(Debug, Default)]
 pub(crate) struct Interrupt {
-    flag: Flag,
+    /// Raised once there was an interrupt.
+    pub(crate) flag: Flag,
     has_caller: AtomicBool,
 }
 
@@ -37,10 +38,5 @@ impl Interrupt {
     /// Leaves the first interrupt from now on to the caller, who looks at [`Interrupt::flag`].
     pub(crate) fn wait_for_caller(&self) {
         self.has_caller.store(true, Ordering::SeqCst);
-    }
-
-    /// Raised once there was an interrupt.
-    pub(crate) fn flag(&self) -> Flag {
-        self.flag.clone()
     }
 }

@@ -174,7 +174,7 @@ pub fn run_with<O: Observer>(
     if !arguments.quiet {
         say!("wrote {}", folder.path.join("index.html").display());
     }
-    if arguments.validate { device.check_validation() } else { Ok(()) }
+    device.check_validation()
 }
 
 /// Layers the options over the quick settings over the study file.

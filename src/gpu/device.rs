@@ -42,7 +42,8 @@ pub struct Device {
     queue: RwLock<vk::Queue>,
     capabilities: Capabilities,
     pub(super) physical: vk::PhysicalDevice,
-    tracer: Tracer,
+    /// Part of the machine that was asked to trace.
+    pub(crate) tracer: Tracer,
     /// The library by which the host traces, if it does.
     pub(crate) embree: Option<Arc<Embree>>,
     pub(super) set_layouts: SetLayouts,
@@ -178,11 +179,6 @@ impl Device {
     /// Names what traces: "device" or "Embree 3.13.5".
     pub fn tracer(&self) -> String {
         tracer_name(self.embree.as_ref())
-    }
-
-    /// True if the device must not trace in the host's place.
-    pub(crate) fn must_trace_on_host(&self) -> bool {
-        self.tracer == Tracer::Host
     }
 
     /// Messages of the validation layers so far; empty without validation.

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     accel::{Accel, MAX_TRIANGLE_PAGES, TriangleRecord},
     error::{Error, Result},
-    gpu::{Buffer, Capabilities, Device},
+    gpu::{Buffer, Capabilities, Device, Tracer},
     shader::{
         bindings::{Binding, scene},
         constants::{
@@ -84,7 +84,7 @@ impl GeometryBuffers {
         passages: Option<Passages>,
     ) -> Result<Self> {
         let Some(embree) = &device.embree else { return Ok(self) };
-        let must_trace = device.must_trace_on_host();
+        let must_trace = device.tracer == Tracer::Host;
         match HostTracer::new(embree, accel, &self.pages, passages, must_trace) {
             Ok(tracer) => {
                 let traversal = Traversal { is_on_host: true, ..self.traversal };

@@ -113,7 +113,7 @@ impl Sequence {
             self.denoiser = Some(Denoiser::load()?);
         }
         self.interrupt.wait_for_caller();
-        if frame.is_some() && self.interrupt.flag().is_raised() {
+        if frame.is_some() && self.interrupt.flag.is_raised() {
             return Err(Error::Interrupted);
         }
         let device = self.device(arguments)?;
@@ -157,9 +157,7 @@ impl Sequence {
         } else {
             self.carried = still_hash.map(|still_hash| Carried { session, still_hash });
         }
-        if arguments.validate {
-            device.check_validation()?;
-        }
+        device.check_validation()?;
         if reason == StopReason::Interrupt { Err(Error::Interrupted) } else { Ok(()) }
     }
 
@@ -225,9 +223,7 @@ pub fn film(
     let reason = session.run(&arguments.rules(scene.asked), observer)?;
     device.save_pipeline_cache();
     let image = session.image(&aovs)?;
-    if arguments.validate {
-        device.check_validation()?;
-    }
+    device.check_validation()?;
     Ok((image, reason))
 }
 
@@ -317,7 +313,7 @@ impl<'a> Display<'a> {
 
 impl Observer for Display<'_> {
     fn interrupt(&self) -> Flag {
-        self.interrupt.flag()
+        self.interrupt.flag.clone()
     }
 
     fn notice(&mut self, event: &Event<'_>) {
