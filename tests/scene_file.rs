@@ -26,7 +26,6 @@ fn sources() -> String {
         "file/mod.rs",
         "file/read.rs",
         "file/material.rs",
-        "file/lamp.rs",
         "file/value.rs",
         "lib.rs",
         "lamp.rs",
