@@ -9,7 +9,6 @@ use super::{
     Entry,
     value::{TextureEntry, Textured},
 };
-use crate::material::Principled;
 
 pub(crate) type MaterialEntry = Entry<MaterialKeys, MaterialKindEntry>;
 
@@ -156,7 +155,7 @@ fn default_metallic() -> Textured<f32> {
 }
 
 fn default_sheen_roughness() -> f32 {
-    Principled::default().sheen_roughness
+    0.5
 }
 
 fn default_specular() -> f32 {
