@@ -644,6 +644,7 @@ fn stretched_highlights_are_written() {
         let [from_gltf, from_pbrt] = [gltf_path, pbrt_path].map(|path| Scene::load(&path).unwrap());
         let material = &ours.materials[0];
         for (read, is_exact) in [&from_gltf, &from_mitsuba, &from_pbrt].into_iter().zip(is_exact) {
+            assert_eq!(read.geometry.uvs[0].len(), read.geometry.positions.len(), "{text}{turn}");
             // Index 0 may be a diffuse surface of another object.
             let found = read.materials.iter().find(|own| own.name == material.name);
             let found = found.unwrap_or(&read.materials[0]);

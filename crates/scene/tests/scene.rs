@@ -698,6 +698,11 @@ fn a_texture_without_coordinates_is_a_warning_by_name() {
     assert!(
         warning.contains("object `sheet` (bare.obj, line 14): the material `grey` has textures")
     );
+    let brushed = "type = \"conductor\"\nalpha = 0.1\nanisotropy = 0.5\nreflectance";
+    let brushed = HEAD.replace("type = \"diffuse\"\nreflectance", brushed);
+    let scene = load(&folder, &format!("{brushed}{object}")).unwrap();
+    let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+    assert!(warning.ends_with("no texture coordinates: their direction is arbitrary"), "{warning}");
     // A material may read the second set of coordinates, and the file have the first alone.
     let attributes = [
         Attribute::floats("POSITION", "VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]),

@@ -87,8 +87,8 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Widths of GGX along tangent and bitangent, where they differ; with the names of what the formats that
-    /// have no more than these lose.
+    /// Widths of GGX along tangent and bitangent, where they differ. Names other directions, for formats that
+    /// have none, and rounds their widths.
     pub(super) fn widths(&mut self, alpha: f32) -> Option<[f32; 2]> {
         let anisotropy = &self.surface.anisotropy;
         if anisotropy.strength == 0.0 {

@@ -70,7 +70,7 @@ impl Width {
         Self::of_pair([alpha / aspect, alpha * aspect].map(|width| width.clamp(MIN_ALPHA, 1.0)))
     }
 
-    /// Mean of all directions, for a model without anisotropy; counts the loss as `feature`.
+    /// Mean of all directions, for a model without anisotropy; `ignore` counts the loss.
     pub(crate) fn rounded(mut self, ignore: impl FnOnce()) -> Self {
         if self.anisotropy.strength > 0.0 {
             ignore();

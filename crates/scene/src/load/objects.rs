@@ -343,7 +343,15 @@ fn emits(object: &ObjectEntry, mesh: &Mesh, materials: &[Material]) -> bool {
 /// Warning of a material with textures on a mesh without texture coordinates.
 pub(super) fn lacking_uvs(label: &str, material: &Material, mesh: &Mesh) -> Option<String> {
     let lacks = |set: u32| mesh.uvs[set.min(1) as usize].is_empty();
-    let texture = material.surface.textures().find(|used| lacks(used.uv_set))?;
+    let Some(texture) = material.surface.textures().find(|used| lacks(used.uv_set)) else {
+        let name = &material.name;
+        return material.surface.tangent_uv_set().filter(|&set| lacks(set)).map(|_| {
+            format!(
+                "{label}: the material `{name}` stretches highlights along u, but the mesh has no texture \
+                 coordinates: their direction is arbitrary"
+            )
+        });
+    };
     Some(format!(
         "{label}: the material `{}` has textures, but the mesh has no texture coordinates for {}: the \
          object has the colour of one texel",

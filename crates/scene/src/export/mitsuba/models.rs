@@ -73,7 +73,7 @@ impl Translator<'_> {
                 "its textures read two sets of coordinates, Mitsuba's only the first of them",
             );
         }
-        let uvs = uv_set.map(|set| (set as usize, SAME_UV));
+        let uvs = uv_set.or(surface.tangent_uv_set()).map(|set| (set as usize, SAME_UV));
         let attributes = Attributes { uvs, color_factor: self.color_factor };
         Model { bsdf, emitter, has_back, attributes }
     }

@@ -8,7 +8,7 @@ use super::triple;
 use crate::{
     coat::{COAT_IOR, base_below_coat},
     export::{
-        folder::{Attributes, Folder},
+        folder::{Attributes, Folder, SAME_UV},
         images::{Pictures, Recipe},
         subject::{Opacity, Subject, index_of},
     },
@@ -84,6 +84,7 @@ impl<'a> Translator<'a> {
             let [row_u, [a, b, c]] = base.image_from_uv;
             (base.uv_set as usize, [row_u, [-a, -b, 1.0 - c]])
         });
+        let uvs = uvs.or(surface.tangent_uv_set().map(|set| (set as usize, SAME_UV)));
         Model { text, light, alpha, attributes: Attributes { uvs, color_factor: None } }
     }
 
