@@ -36,10 +36,9 @@ void write_plain_ray(uint place, Vertex vertex, uint number) {
     DirectionSample sampled;
     float pdf;
     if (SAMPLER == SAMPLER_UNIFORM) {
-        vec2 u = vertex_numbers(vertex, number, DIMENSION_BRDF_DIRECTION);
-        vec2 azimuth = sin_cos_pi(2.0 * u.y);
-        sampled =
-            evaluate_local(vertex, vec3(sqrt(u.x * (2.0 - u.x)) * azimuth.yx, 1.0 - u.x));
+        vec3 incident_local =
+            sample_uniform_hemisphere(vertex_numbers(vertex, number, DIMENSION_BRDF_DIRECTION));
+        sampled = evaluate_local(vertex, incident_local);
         pdf = 0.5 / PI;
     } else if (SAMPLER == SAMPLER_COSINE) {
         vec3 incident_local =

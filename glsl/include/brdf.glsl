@@ -62,6 +62,12 @@ vec3 sample_cosine_hemisphere(vec2 u) {
     return vec3(radius * cos(azimuth), radius * sin(azimuth), sqrt(max(0.0, 1.0 - u.x)));
 }
 
+// Samples a direction with density 1/2π: the product of a sheen and the cosine is bounded.
+vec3 sample_uniform_hemisphere(vec2 u) {
+    vec2 azimuth = sin_cos_pi(2.0 * u.y);
+    return vec3(sqrt(u.x * (2.0 - u.x)) * azimuth.yx, 1.0 - u.x);
+}
+
 // Directional albedo of a GGX surface with Schlick's reflectance: factors of the reflectance at normal
 // and at grazing incidence. Linear in roughness and cosine between the nodes of the table that all such
 // materials share.
@@ -427,7 +433,7 @@ vec3 brdf_sample(Reflector reflector, vec3 u) {
     if (is_covered(material)) {
         if (u.x < reflector.cover_share) {
             if (is_kind(material, MATERIAL_SHEEN)) {
-                return sample_hemisphere(u.yz);
+                return sample_uniform_hemisphere(u.yz);
             }
             GgxWidth width = round_width(material.cover_alpha);
             float cap_factor = ggx_cap_factor(reflector.outgoing_local, width);

@@ -29,10 +29,3 @@ float sheen_value(vec3 half_vector, float outgoing_cosine, float incident_cosine
         1.0 + sheen_lambda(outgoing_cosine, alpha) + sheen_lambda(incident_cosine, alpha);
     return density * min(1.0 / (4.0 * masking * outgoing_cosine * incident_cosine), 1.0);
 }
-
-// Samples a direction with density 1/2π: the product of value and cosine is bounded.
-vec3 sample_hemisphere(vec2 u) {
-    float radius = sqrt(max(0.0, 1.0 - u.x * u.x));
-    float azimuth = 2.0 * PI * u.y;
-    return vec3(radius * cos(azimuth), radius * sin(azimuth), u.x);
-}

@@ -112,7 +112,7 @@ pub(crate) fn coat_words(weight: f32, alpha: f32) -> Vec<u32> {
 pub(crate) fn sheen_words(strength: f32, alpha: f32) -> Vec<u32> {
     let albedo = |outgoing: Vec3| {
         let light = |u: Vec2| {
-            let incident = sample_hemisphere(u * vec2(1.0, 0.5));
+            let incident = sample_uniform_hemisphere(u * vec2(1.0, 0.5));
             incident.z * sheen_value(outgoing + incident, outgoing.z, incident.z, alpha)
         };
         2.0 * PI * grid(SHEEN_POINTS).map(light).sum::<f32>() / (SHEEN_POINTS * SHEEN_POINTS) as f32

@@ -45,7 +45,7 @@ impl MaterialTables {
             let anisotropy = &material.surface.anisotropy;
             let widths = |converted: &mut structs::Material, alpha: f32| {
                 let [along, across] = anisotropy.widths(alpha.max(SMALLEST_ALPHA));
-                converted.alpha = 0.5 * (along + across);
+                converted.alpha = anisotropy.mean_width(across);
                 let stretch = (along - across) / (along + across);
                 let twice = Vec2::from_angle(2.0 * anisotropy.rotation);
                 converted.anisotropy = (stretch * twice).to_array();

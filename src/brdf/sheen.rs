@@ -44,9 +44,9 @@ pub(super) fn sheen_value(
     density * (4.0 * masking * outgoing_cosine * incident_cosine).recip().min(1.0)
 }
 
-/// Samples a direction with density 1/2π: the product of value and cosine is bounded.
-pub fn sample_hemisphere(u: Vec2) -> Vec3 {
-    let radius = (1.0 - u.x * u.x).max(0.0).sqrt();
+/// Samples a direction with density 1/2π, as `glsl/include/brdf.glsl` does.
+pub fn sample_uniform_hemisphere(u: Vec2) -> Vec3 {
+    let radius = (u.x * (2.0 - u.x)).sqrt();
     let azimuth = 2.0 * PI * u.y;
-    vec3(radius * azimuth.cos(), radius * azimuth.sin(), u.x)
+    vec3(radius * azimuth.cos(), radius * azimuth.sin(), 1.0 - u.x)
 }

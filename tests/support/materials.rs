@@ -137,7 +137,7 @@ pub fn cases() -> &'static [Case] {
             case("coated metal", 0.1, coated(vec3(1.0, 0.7, 0.3), [1.0, 1.0, 0.5, 0.7, 0.2])),
             case("rough coat", 0.04, coated(vec3(0.8, 0.4, 0.2), [0.4, 1.0, 0.2, 1.0, 0.6])),
             case("coated black", 0.06, coated(Vec3::ZERO, [0.0, 0.0, 1.0, 1.0, 0.25])),
-            case("velvet", 0.3, cloth(vec3(0.2, 0.02, 0.05), 1.0, vec3(0.9, 0.3, 0.5), 0.35)),
+            case("velvet", 0.2, cloth(vec3(0.2, 0.02, 0.05), 1.0, vec3(0.9, 0.3, 0.5), 0.35)),
             case("white cloth", 0.5, cloth(Vec3::ONE, 0.0, Vec3::ONE, 0.6)),
             brushed(
                 case("brushed gold", 0.1, MaterialKind::Conductor { alpha: 0.1, fresnel: GOLD }),

@@ -4,7 +4,7 @@
 use std::f32::consts::PI;
 
 use fenestra::{
-    brdf::{MaterialTables, brdf_evaluate, ggx::*, of_side, sheen::sample_hemisphere},
+    brdf::{MaterialTables, brdf_evaluate, ggx::*, of_side, sheen::sample_uniform_hemisphere},
     math::colour::luminance,
     scene::measured::lookup::{
         cosine_table, half_difference_angles, measured_pdf, measured_sample, mix,
@@ -186,7 +186,7 @@ pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
     if matches!(material.kind, MATERIAL_COATED | MATERIAL_SHEEN) {
         let cover_share = cover_share(brdf_table, material, outgoing_local.z);
         if u.x < cover_share && material.kind == MATERIAL_SHEEN {
-            return sample_hemisphere(vec2(u.y, u.z));
+            return sample_uniform_hemisphere(vec2(u.y, u.z));
         }
         if u.x < cover_share {
             let width = GgxWidth::round(material.cover_alpha);

@@ -131,6 +131,11 @@ impl Anisotropy {
         [alpha + (1.0 - alpha) * self.strength * self.strength, alpha]
     }
 
+    /// Mean of both.
+    pub fn mean_width(&self, alpha: f32) -> f32 {
+        0.5 * self.widths(alpha).iter().sum::<f32>()
+    }
+
     /// Width of a material, and its anisotropy, from the widths along tangent and bitangent.
     pub(crate) fn of_widths([along_u, along_v]: [f32; 2]) -> (f32, Self) {
         let (least, most) = (along_u.min(along_v), along_u.max(along_v));
@@ -141,12 +146,11 @@ impl Anisotropy {
 
     /// The material with the mean of its widths for all directions.
     pub(crate) fn rounded(&self, mut kind: MaterialKind) -> MaterialKind {
-        let mean = |alpha| 0.5 * self.widths(alpha).iter().sum::<f32>();
         match &mut kind {
             _ if self.strength == 0.0 => {}
-            MaterialKind::Conductor { alpha, .. } => *alpha = mean(*alpha),
+            MaterialKind::Conductor { alpha, .. } => *alpha = self.mean_width(*alpha),
             MaterialKind::Principled(own) => {
-                own.roughness = mean(own.roughness * own.roughness).sqrt();
+                own.roughness = self.mean_width(own.roughness * own.roughness).sqrt();
             }
             _ => {}
         }

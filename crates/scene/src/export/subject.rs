@@ -105,7 +105,7 @@ impl<'a> Subject<'a> {
             self.warn(
                 "its highlights are stretched in another direction than u and v; they become round",
             );
-            return Some([0.5 * (along + across); 2]);
+            return Some([anisotropy.mean_width(alpha); 2]);
         }
         let is_along_u = quarters.round().rem_euclid(2.0) == 0.0;
         Some(if is_along_u { [along, across] } else { [across, along] })

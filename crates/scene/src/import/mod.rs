@@ -74,7 +74,7 @@ impl Width {
     pub(crate) fn rounded(mut self, ignore: impl FnOnce()) -> Self {
         if self.anisotropy.strength > 0.0 {
             ignore();
-            self.alpha = 0.5 * self.anisotropy.widths(self.alpha).iter().sum::<f32>();
+            self.alpha = self.anisotropy.mean_width(self.alpha);
             self.anisotropy = Anisotropy::default();
         }
         self

@@ -102,9 +102,7 @@ impl Reader {
                 if node.kind() == "pplastic" {
                     self.ignored.add(features::MI_POLARIZED, || node.place());
                 }
-                let width = self.width(&parameters)?;
-                let width =
-                    width.rounded(|| self.ignored.add(features::MI_ANISOTROPIC, || node.place()));
+                let width = self.round_width(&parameters)?;
                 self.plastic(&parameters, Some(width))?
             }
             "conductor" | "mirror" => self.conductor(&parameters, None)?,
@@ -117,9 +115,7 @@ impl Reader {
             }
             "dielectric" => self.dielectric(&parameters, Some(0.0))?,
             "roughdielectric" | "roughglass" => {
-                let width = self.width(&parameters)?;
-                let Width { alpha, texture, .. } =
-                    width.rounded(|| self.ignored.add(features::MI_ANISOTROPIC, || node.place()));
+                let Width { alpha, texture, .. } = self.round_width(&parameters)?;
                 let mut model = self.dielectric(&parameters, Some(alpha))?;
                 model.surface.roughness = texture;
                 model
@@ -239,6 +235,13 @@ impl Reader {
         }
         parameters.without_effect("sample_visible specular_sampling_weight");
         self.width_of(parameters)
+    }
+
+    /// The same for a model whose width is one for all directions.
+    pub(super) fn round_width(&mut self, parameters: &Parameters<'_>) -> Result<Width> {
+        let width = self.width(parameters)?;
+        let place = || parameters.node.place();
+        Ok(width.rounded(|| self.ignored.add(features::MI_ANISOTROPIC, place)))
     }
 
     pub(super) fn width_of(&mut self, parameters: &Parameters<'_>) -> Result<Width> {

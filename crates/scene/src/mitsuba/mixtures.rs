@@ -92,8 +92,7 @@ impl Reader {
         let width = if parameters.node.kind() == "coating" {
             Width::round(MIN_ALPHA, None)
         } else {
-            let width = self.width(parameters)?;
-            width.rounded(|| self.ignored.add(features::MI_ANISOTROPIC, || parameters.node.place()))
+            self.round_width(parameters)?
         };
         let ior = self.ior(parameters, "bk7")?;
         let coated = |reflectance, alpha| {
