@@ -24,7 +24,8 @@ void main() {
         + sample_offset(index.pixel, index.sample_index, wave.seed);
 
     vec2 film_size = vec2(parameters.film_width, parameters.film_height);
-    vec2 plane = (2.0 * position - film_size) / film_size.y * parameters.camera_tan_half_fov;
+    vec2 plane = ((2.0 * position - film_size) / film_size.y + parameters.camera_shift)
+        * parameters.camera_tan_half_fov;
     vec3 direction = parameters.camera_forward + plane.x * parameters.camera_right
         - plane.y * parameters.camera_up;
     vec3 origin = parameters.camera_position;

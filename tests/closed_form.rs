@@ -184,6 +184,8 @@ fn an_edge_has_the_blur_of_filter_and_lens() {
     (scene.camera.position, scene.camera.look_at) = (Vec3::NEG_Z * 10.0, Vec3::NEG_Z * 20.0);
     scene.camera.vertical_fov_deg = 50.0;
     (scene.film.width, scene.film.height) = (21, 7);
+    // The lens is shifted to the right by three pixels.
+    scene.camera.shift[0] = 3.0 / 7.0;
     let pixel = 2.0 * 25_f64.to_radians().tan() / 7.0;
     // Share of a disk left of the line at `x` of its radius.
     let disk = |x: f64| {
@@ -209,7 +211,7 @@ fn an_edge_has_the_blur_of_filter_and_lens() {
             let bright = |step: u32| {
                 let offset = ((f64::from(step) + 0.5) / f64::from(STEPS) * 2.0 - 1.0) * reach;
                 let weight = if filter == Filter::Box { 1.0 } else { 3.0 * shared(offset) };
-                let at = (f64::from(column) - 10.0 + offset) * pixel;
+                let at = (f64::from(column) - 7.0 + offset) * pixel;
                 let sharp = if radius > 0.0 { f64::from(focus / radius) } else { 1e6 };
                 weight * disk(at * sharp)
             };
@@ -228,6 +230,11 @@ fn an_edge_has_the_blur_of_filter_and_lens() {
             assert!((variance - of_coin).abs() < 0.02, "{name}: {variance}, not {of_coin}");
         }
     }
+    // The border across the film, in the middle of its lowest row.
+    (scene.camera.up, scene.camera.shift) = (Vec3::X, [0.0, 3.0 / 7.0]);
+    let sums = render(&scene, Settings { shadow_rays: 0, ..Settings::default() }, 64);
+    let dark = (0..sums.pixel_count()).filter(|pixel| sums.mean(*pixel)[0] < 0.75);
+    assert_eq!(dark.collect::<Vec<_>>(), (6 * 21..7 * 21).collect::<Vec<_>>());
 }
 
 #[test]

@@ -253,6 +253,7 @@ fn with_camera(parameters: SceneParameters, camera: &Camera) -> SceneParameters 
         camera_up: up.into(),
         camera_tan_half_fov: (0.5 * camera.vertical_fov_deg).to_radians().tan(),
         camera_forward: forward.into(),
+        camera_shift: [2.0 * camera.shift[0], -2.0 * camera.shift[1]],
         ..parameters
     }
 }

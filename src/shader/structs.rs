@@ -85,6 +85,8 @@ structs! {
         camera_tan_half_fov: float,
         /// Unit view axis.
         camera_forward: vec3,
+        /// Place of the image's centre right of and below the view axis, in halves of the image's height.
+        camera_shift: vec2,
         /// Film width in pixels, of the whole image.
         film_width: uint,
         /// Film height in pixels, of the whole image.

@@ -122,6 +122,7 @@ mod tests {
             vertical_fov_deg: 90.0,
             aperture_radius: 0.0,
             focus_distance: 4.0,
+            shift: [0.0; 2],
         })
     }
 

@@ -41,6 +41,7 @@ fn camera(position: Vec3, look_at: Vec3) -> Camera {
         vertical_fov_deg: 50.0,
         aperture_radius: 0.0,
         focus_distance: 1.0,
+        shift: [0.0; 2],
     }
 }
 

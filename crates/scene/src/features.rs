@@ -112,7 +112,7 @@ features! {
     PBRT_COLOR_SPACE "`ColorSpace` other than `srgb`" "colours are those of Rec.709";
     PBRT_MOTION "`ActiveTransform`, `TransformTimes`" "nothing moves";
     PBRT_MEDIUM "other media" "";
-    PBRT_SCREEN_WINDOW "`screenwindow` that is not centred or of another ratio"
+    PBRT_SCREEN_WINDOW "`screenwindow` of another ratio"
         "its height alone counts";
     PBRT_ASPECT "`frameaspectratio` other than that of the film" "pixels are square";
     PBRT_CURVE "exact form of `curve`" "tubes of 3 to 6 sides";
@@ -180,8 +180,6 @@ features! {
     MI_EMITTER "other emitters, by name" "left out";
     MI_SENSORS "sensors that are not used" "";
     MI_MIRRORED "mirror image of the sensor's `to_world`" "the picture is not mirrored";
-    MI_PRINCIPAL_POINT "`principal_point_offset_x`, `principal_point_offset_y`" "";
-    MI_CROP "crop of the film off its middle" "the whole film; one in the middle is done";
     MI_FILTER "other `rfilter`s" "`gaussian` of ½";
     MI_INTEGRATOR "integrators of other pictures than those of paths, by name" "";
     MI_HIDE_EMITTERS "`hide_emitters`" "lights are seen";

@@ -22,6 +22,9 @@ pub(crate) fn hash(scene: &Scene) -> String {
         let camera = &scene.camera;
         hasher.array(&[camera.position, camera.look_at, camera.up]);
         hasher.array(&[camera.vertical_fov_deg, camera.aperture_radius, camera.focus_distance]);
+        if camera.shift != [0.0; 2] {
+            hasher.array(&[camera.shift]);
+        }
         hasher.still(scene);
     })
 }

@@ -147,6 +147,9 @@ pub struct Camera {
     pub aperture_radius: f32,
     /// Distance along the view axis from the lens to the plane of focus, metres.
     pub focus_distance: f32,
+    /// Place of the image's centre right of and above `look_at`, in heights of the image: a shifted lens,
+    /// which keeps lines parallel that run along the film.
+    pub shift: [f32; 2],
 }
 
 /// Most portals of a scene: every shadow ray goes through all of them.

@@ -32,10 +32,9 @@ fn the_camera_follows_its_key_frames() {
     // The first key focuses where it looks: 29^½ away.
     assert!((halfway.focus_distance - 0.5 * (2.0 + 29_f32.sqrt())).abs() < 1e-5);
     assert_eq!(camera(Some(9.0)).position.x, 6.0, "after the last");
-    let focused =
-        ROOM.replace("vertical_fov_deg = 40,", "vertical_fov_deg = 40, focus_distance = 3,");
+    let focused = ROOM.replace("_deg = 40,", "_deg = 40, focus_distance = 3, shift = [0.2, -0.1],");
     let first = at("room.toml", &focused, Some(1.0)).unwrap().camera;
-    assert_eq!(first.focus_distance, 3.0, "that of the camera");
+    assert_eq!((first.focus_distance, first.shift), (3.0, [0.2, -0.1]), "that of the camera");
 
     let keys = "position = [2, 1, 5], up = [1, 1, 0], vertical_fov_deg = 50 }";
     let leaning = ROOM.replace("position = [2, 1, 5] }", keys);

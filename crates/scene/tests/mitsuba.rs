@@ -183,11 +183,6 @@ fn cameras_look_along_z_and_stand_upright() {
     assert_eq!(scene.film.filter, Filter::Gaussian);
     assert_eq!(scene.warnings, [""; 0]);
     assert_eq!(scene.environment.texels[0], Vec3::ZERO, "no light but that of the file");
-    for axis in ["x", "y"] {
-        let offset = format!("<float name=\"principal_point_offset_{axis}\" value=\"-0.1\"/>");
-        let warnings = self::camera(&offset, "").warnings;
-        assert!(warnings[0].contains("ignored `principal_point_offset_x`, "), "{warnings:?}");
-    }
     let mirrored = self::camera(
         r#"<transform name="to_world"><scale x="-1"/></transform>"#,
         r#"<rfilter type="tent"/>"#,
@@ -199,24 +194,35 @@ fn cameras_look_along_z_and_stand_upright() {
 }
 
 #[test]
-fn crops_in_the_middle_are_rendered_and_others_named() {
-    let side = |name: &str, pixels: u32| format!("<integer name=\"{name}\" value=\"{pixels}\"/>");
-    let crop = |x: u32| {
-        side("width", 200)
-            + &side("height", 100)
-            + &side("crop_width", 100)
-            + &side("crop_height", 50)
-            + &side("cropOffsetX", x)
-            + &side("crop_offset_y", 25)
-    };
-    let fov = "<float name=\"fov\" value=\"90\"/><string name=\"fov_axis\" value=\"y\"/>";
-    let scene = camera(fov, &crop(50));
-    assert_eq!((scene.film.width, scene.film.height), (100, 50));
-    let tangent = (0.5 * scene.camera.vertical_fov_deg).to_radians().tan();
-    assert!((tangent - 0.5).abs() < 1e-6, "{tangent}");
-    let scene = camera(fov, &crop(0));
-    assert_eq!((scene.film.width, scene.film.height), (200, 100));
-    assert!(scene.warnings[0].contains("crop of the film"), "{:?}", scene.warnings);
+fn crops_and_principal_points_shift_the_lens() {
+    // Middle, upper edge and right edge of the picture at a distance of 1, from rays of Mitsuba 3.9.1.
+    for (offset, crop, middle, top, right) in [
+        ([-0.1, 0.0], None, [-0.4, 0.0], 1.0, 1.6),
+        ([0.0, -0.1], None, [0.0, 0.2], 1.2, 2.0),
+        ([0.0, 0.0], Some([60, 40, 100, 10]), [0.6, 0.4], 0.8, 1.2),
+        ([0.1, 0.2], Some([60, 40, 100, 10]), [1.0, 0.0], 0.4, 1.6),
+    ] {
+        let integer =
+            |(name, pixels): (&str, u32)| format!("<integer name=\"{name}\" value=\"{pixels}\"/>");
+        let names = ["crop_width", "crop_height", "cropOffsetX", "crop_offset_y"];
+        let crop = crop
+            .map_or_else(String::new, |crop| names.into_iter().zip(crop).map(integer).collect());
+        let film = integer(("width", 200)) + &integer(("height", 100)) + &crop;
+        let number = |name: &str, value: f32| format!("<float name=\"{name}\" value=\"{value}\"/>");
+        let sensor = number("fov", 90.0)
+            + "<string name=\"fov_axis\" value=\"y\"/>"
+            + &number("principal_point_offset_x", offset[0])
+            + &number("principal_point_offset_y", offset[1]);
+        let scene = camera(&sensor, &film);
+        assert_eq!(scene.warnings, [""; 0]);
+        let half = (0.5 * scene.camera.vertical_fov_deg).to_radians().tan();
+        let shift = scene.camera.shift.map(|heights| 2.0 * heights * half);
+        let aspect = scene.film.width as f32 / scene.film.height as f32;
+        let found = [shift[0], shift[1], shift[1] + half, shift[0] + half * aspect];
+        for (found, expected) in found.into_iter().zip([middle[0], middle[1], top, right]) {
+            assert!((found - expected).abs() < 1e-5, "{offset:?}: {found}, not {expected}");
+        }
+    }
 }
 
 #[test]

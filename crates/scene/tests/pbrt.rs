@@ -122,6 +122,13 @@ fn fov_is_that_of_the_shorter_side_and_lenses_scale() {
         let scene = load(&window.replace("0.8888889", side), "");
         assert!(warnings(&scene)[0].contains("`screenwindow`"), "{:?}", scene.warnings);
     }
+    // Half as high, and to the right of the axis and below it.
+    let scene =
+        load(&window.replace("-0.8888889 0.8888889 -0.5 0.5", "0 0.8888889 -1.25 -0.75"), "");
+    assert_eq!(warnings(&scene), [DARK]);
+    let half = (0.5 * scene.camera.vertical_fov_deg).to_radians().tan();
+    let [x, y] = scene.camera.shift.map(|heights| 2.0 * heights * half);
+    assert!((half - 0.25).abs() < 1e-6 && (x - 0.4444444).abs() < 1e-6 && (y + 1.0).abs() < 1e-6);
 }
 
 #[test]

@@ -1051,6 +1051,7 @@ fn the_hash_follows_the_picture_and_not_the_text() {
         // The point looked at is 5 m away, and in focus without this.
         ("= 40", "= 40\naperture_radius = 0.1\nfocus_distance = 5"),
         ("= 40", "= 40\nfocus_distance = 4"),
+        ("= 40", "= 40\nshift = [0, 0.1]"),
         ("constant = [1, 1, 1]", "constant = [1, 1, 1.001]"),
         ("0.5, 0.5, 0.5", "0.5, 0.5, 0.501"),
         ("type = \"diffuse\"\nreflectance", "type = \"conductor\"\nalpha = 0.5\nreflectance"),

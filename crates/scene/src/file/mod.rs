@@ -64,6 +64,9 @@ pub(crate) struct CameraEntry {
     pub aperture_radius: f32,
     /// Distance to the plane of focus, metres; required with an aperture.
     pub focus_distance: Option<f32>,
+    /// Place of the image's centre right of and above `look_at`, in heights of the image.
+    #[serde(default)]
+    pub shift: [f32; 2],
 }
 
 /// One `[[camera.keyframe]]`; what it leaves out is that of `[camera]`.

@@ -285,6 +285,7 @@ impl<'a> Loader<'a> {
         let up = self.vector("camera.up", entry.up, FINITE)?;
         self.check_range("camera.vertical_fov_deg", &[entry.vertical_fov_deg], (0.01, 179.0))?;
         self.check_range("camera.aperture_radius", &[entry.aperture_radius], (0.0, f32::MAX))?;
+        self.check_range("camera.shift", &entry.shift, (-100.0, 100.0))?;
         let view = look_at - position;
         let Some(view_direction) = view.try_normalize() else {
             return Err(self.error(format!(
@@ -308,8 +309,10 @@ impl<'a> Loader<'a> {
             vertical_fov_deg: entry.vertical_fov_deg,
             aperture_radius: entry.aperture_radius,
             focus_distance,
+            shift: entry.shift,
         })
     }
+
     /// Returns the camera at the time of the options: that of the key frames, each number along a smooth
     /// curve that never leaves the range of its two keys; before the first and after the last it stands.
     /// Without a time or key frames, the camera of `[camera]`.
@@ -350,6 +353,7 @@ impl<'a> Loader<'a> {
                 .iter()
                 .any(|camera| camera.focus_distance.is_some())
                 .then(|| number(&focus_distance)),
+            shift: file.camera.shift,
         })
     }
 }
@@ -362,6 +366,7 @@ fn completed(frame: &KeyframeEntry, camera: &CameraEntry) -> CameraEntry {
         vertical_fov_deg: frame.vertical_fov_deg.unwrap_or(camera.vertical_fov_deg),
         aperture_radius: frame.aperture_radius.unwrap_or(camera.aperture_radius),
         focus_distance: frame.focus_distance.or(camera.focus_distance),
+        shift: camera.shift,
     }
 }
 

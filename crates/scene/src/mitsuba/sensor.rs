@@ -1,6 +1,6 @@
 //! Sensors and their film → [`CameraEntry`] and [`FilmSettings`].
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{
     Reader,
@@ -19,10 +19,10 @@ const FOV_RANGE_DEG: (f64, f64) = (0.01, 179.0);
 /// Film with the part of it that is rendered.
 struct Film {
     settings: FilmSettings,
-    /// Height of the part over that of the whole film.
-    height_share: f64,
-    /// Width of the whole film over its height.
-    aspect: f64,
+    /// Width and height of the whole film, pixels.
+    whole: DVec2,
+    /// Place of the part's middle from that of the whole, pixels.
+    middle: DVec2,
 }
 
 impl Reader {
@@ -127,12 +127,14 @@ impl Reader {
         if matrix.determinant() < 0.0 {
             self.ignored.add(features::MI_MIRRORED, || node.place());
         }
-        for name in ["principal_point_offset_x", "principal_point_offset_y"] {
-            if parameters.float(name)?.is_some_and(|offset| offset != 0.0) {
-                self.ignored.add(features::MI_PRINCIPAL_POINT, || node.place());
-            }
-        }
-        let tangent = half_height_tangent(parameters, film.aspect)? * film.height_share;
+        let offset = |name: &str| Ok(f64::from(parameters.float(name)?.unwrap_or(0.0)));
+        let offset =
+            DVec2::new(offset("principal_point_offset_x")?, offset("principal_point_offset_y")?);
+        // The y axis of films points down.
+        let height = f64::from(film.settings.height);
+        let shift = (film.middle + offset * film.whole) / height * DVec2::new(1.0, -1.0);
+        let tangent = half_height_tangent(parameters, film.whole.x / film.whole.y)?;
+        let tangent = tangent * height / film.whole.y;
         let vertical_fov_deg = 2.0 * tangent.atan().to_degrees();
         if !(FOV_RANGE_DEG.0..=FOV_RANGE_DEG.1).contains(&vertical_fov_deg) {
             let (low, high) = FOV_RANGE_DEG;
@@ -161,6 +163,7 @@ impl Reader {
             vertical_fov_deg: vertical_fov_deg as f32,
             aperture_radius,
             focus_distance: Some(focus_distance),
+            shift: shift.as_vec2().to_array(),
         })
     }
 
@@ -190,13 +193,8 @@ impl Reader {
                 size.0, size.1, offset.0, offset.1
             )));
         }
-        let is_middle = 2 * offset.0 + size.0 == width && 2 * offset.1 + size.1 == height;
-        let rendered = if is_middle { size } else { (width, height) };
         let mut filter = Filter::Gaussian;
         if let Some(parameters) = &parameters {
-            if !is_middle {
-                self.ignored.add(features::MI_CROP, || parameters.node.place());
-            }
             filter = self.filter(parameters)?;
             parameters.without_effect(
                 "file_format pixel_format component_format banner sample_border compensate \
@@ -204,12 +202,10 @@ impl Reader {
             );
             parameters.finish(&mut self.ignored);
         }
-        let settings = FilmSettings { width: rendered.0 as u32, height: rendered.1 as u32, filter };
-        Ok(Film {
-            settings,
-            height_share: rendered.1 as f64 / height as f64,
-            aspect: width as f64 / height as f64,
-        })
+        let [offset, size, whole] =
+            [offset, size, (width, height)].map(|(x, y)| DVec2::new(x as f64, y as f64));
+        let settings = FilmSettings { width: size.x as u32, height: size.y as u32, filter };
+        Ok(Film { settings, whole, middle: offset + 0.5 * (size - whole) })
     }
 
     fn filter(&mut self, film: &Parameters<'_>) -> Result<Filter> {

@@ -45,7 +45,7 @@ pub(super) fn view(description: &Description, log: &mut Log) -> Result<View> {
         return Err(entity.error("the shutter closes before it opens"));
     }
     exposure *= time as f32;
-    let vertical_fov_deg = vertical_fov_deg(entity, aspect, log)?;
+    let (vertical_fov_deg, shift) = window(entity, aspect, log)?;
     let renderer_from_camera = mirror * world_from_camera;
     let position = renderer_from_camera.w_axis.truncate();
     let axis = |axis: DVec3| renderer_from_camera.transform_vector3(axis);
@@ -61,13 +61,14 @@ pub(super) fn view(description: &Description, log: &mut Log) -> Result<View> {
         vertical_fov_deg: vertical_fov_deg as f32,
         aperture_radius: aperture_radius as f32,
         focus_distance: Some(focus_distance as f32),
+        shift: shift.map(|share| share as f32),
     };
     log.unused(entity);
     Ok(View { camera: Some(camera), film, exposure, mirror })
 }
 
-/// Field of view from bottom to top; `fov` is that of the shorter side.
-fn vertical_fov_deg(entity: &Entity, aspect: f64, log: &mut Log) -> Result<f64> {
+/// Field of view from bottom to top, degrees, and shift of the lens; `fov` is that of the shorter side.
+fn window(entity: &Entity, aspect: f64, log: &mut Log) -> Result<(f64, [f64; 2])> {
     let fov = entity.number("fov", 90.0)?;
     if !(fov > 0.0 && fov < 180.0) {
         return Err(entity.error(format!("expected a `fov` from 0 to 180 degrees, found {fov}")));
@@ -76,21 +77,20 @@ fn vertical_fov_deg(entity: &Entity, aspect: f64, log: &mut Log) -> Result<f64> 
     if own.is_some_and(|own| (own - aspect).abs() > 1e-3 * aspect) {
         log.ignore(features::PBRT_ASPECT, entity.place_of("frameaspectratio"));
     }
-    let mut height = if aspect >= 1.0 { 1.0 } else { 1.0 / aspect };
+    let mut height = if aspect >= 1.0 { 2.0 } else { 2.0 / aspect };
+    let mut shift = [0.0; 2];
     if let [left, right, bottom, top] = *entity.numbers("screenwindow", Kind::Float)? {
-        height = 0.5 * (top - bottom);
-        let is_centred = (left + right).abs() < 1e-4 * (right - left)
-            && (top + bottom).abs() < 1e-4 * (top - bottom);
-        let is_square = ((right - left) / (top - bottom) - aspect).abs() < 1e-3 * aspect;
+        height = top - bottom;
         if height <= 0.0 {
             return Err(entity.error("expected a `screenwindow` with a height above 0"));
         }
-        if !(is_centred && is_square) {
+        shift = [0.5 * (left + right) / height, 0.5 * (bottom + top) / height];
+        if ((right - left) / height - aspect).abs() > 1e-3 * aspect {
             log.ignore(features::PBRT_SCREEN_WINDOW, entity.place_of("screenwindow"));
         }
     }
-    let tangent = (0.5 * fov).to_radians().tan() * height;
-    Ok((2.0 * tangent.atan()).to_degrees())
+    let tangent = (0.5 * fov).to_radians().tan() * 0.5 * height;
+    Ok(((2.0 * tangent.atan()).to_degrees(), shift))
 }
 
 /// Film, the factor of its sensor and its ratio of width to height.

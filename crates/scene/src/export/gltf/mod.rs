@@ -143,6 +143,10 @@ fn camera_nodes(
     if camera.aperture_radius > 0.0 {
         warnings.push("camera: glTF has no lens; all distances are in focus".to_owned());
     }
+    if camera.shift != [0.0; 2] {
+        warnings
+            .push("camera: glTF shifts no lens; the view axis meets the image's centre".to_owned());
+    }
     if film.filter == Filter::Box {
         warnings.push("film: glTF has no filter; readers do not take the box".to_owned());
     }

@@ -109,7 +109,7 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
 /// Camera, sampler and film. Mitsuba leaves out surfaces nearer or farther than its clip planes.
 fn sensor(scene: &Scene, parts: &[Parts], samples: u32) -> String {
     let Camera { position, look_at, up, .. } = scene.camera;
-    let Camera { vertical_fov_deg, aperture_radius, focus_distance, .. } = scene.camera;
+    let Camera { vertical_fov_deg, aperture_radius, focus_distance, shift, .. } = scene.camera;
     // The farthest corner of the box is at least as far as all vertices.
     let corner = parts::bounds(parts)
         .map_or(0.0, |[low, high]| (low - position).abs().max((high - position).abs()).length());
@@ -126,6 +126,10 @@ fn sensor(scene: &Scene, parts: &[Parts], samples: u32) -> String {
     // The plane of focus lies between the clip planes.
     number("far_clip", if aperture_radius > 0.0 { far.max(2.0 * focus_distance) } else { far });
     let FilmSettings { width, height, filter } = scene.film;
+    if shift != [0.0; 2] {
+        number("principal_point_offset_x", shift[0] * height as f32 / width as f32);
+        number("principal_point_offset_y", -shift[1]);
+    }
     let filter = match filter {
         Filter::Box => "<rfilter type=\"box\"/>",
         Filter::Gaussian => {

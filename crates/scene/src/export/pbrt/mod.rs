@@ -95,7 +95,7 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
 /// mirror makes it one of a right-handed world. `fov` is that of the shorter side.
 fn view(scene: &Scene, settings: Settings, name: &str) -> String {
     let Camera { position, look_at, up, .. } = scene.camera;
-    let Camera { vertical_fov_deg, aperture_radius, focus_distance, .. } = scene.camera;
+    let Camera { vertical_fov_deg, aperture_radius, focus_distance, shift, .. } = scene.camera;
     let FilmSettings { width, height, filter } = scene.film;
     let aspect = f64::from(width) / f64::from(height);
     let tangent = (0.5 * f64::from(vertical_fov_deg)).to_radians().tan();
@@ -108,6 +108,19 @@ fn view(scene: &Scene, settings: Settings, name: &str) -> String {
         _ = write!(
             text,
             " \"float lensradius\" {aperture_radius} \"float focaldistance\" {focus_distance}"
+        );
+    }
+    if shift != [0.0; 2] {
+        let height = if aspect > 1.0 { 2.0 } else { 2.0 / aspect };
+        let [x, y] = shift.map(|share| f64::from(share) * height);
+        let [half_width, half_height] = [0.5 * aspect * height, 0.5 * height];
+        _ = write!(
+            text,
+            " \"float screenwindow\" [{} {} {} {}]",
+            x - half_width,
+            x + half_width,
+            y - half_height,
+            y + half_height
         );
     }
     let filter = match filter {
