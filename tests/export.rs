@@ -11,7 +11,7 @@ use fenestra::{
         Scene,
         export::{Settings, gltf, mitsuba::export, pbrt},
         lamp::LampKind,
-        material::{Material, MaterialKind},
+        material::{Material, MaterialKind, Surface},
         measured::{MeasuredTable, RglTraits},
         texture::{TextureUse, Wrap},
     },
@@ -499,6 +499,10 @@ fn specular_materials_come_back_as_they_were() {
         ("type = \"dielectric\"\nabsorption = [3, 0, 0.5]", "\"volpath\""),
         ("type = \"dielectric\"\nalpha = 0.0625\nreflectance = [0.5, 1, 1]", "\"roughdielectric\""),
         ("type = \"thin_dielectric\"\nior = 1.5", "\"thindielectric\""),
+        (
+            "type = \"thin_dielectric\"\ntransmittance = { texture = \"four colours.png\" }",
+            "\"bitmap\"",
+        ),
     ] {
         let (_, xml, warnings, [ours, read]) = both(clay, "");
         assert_eq!(warnings, [""; 0]);
@@ -506,7 +510,10 @@ fn specular_materials_come_back_as_they_were() {
         assert_eq!(xml.contains("twosided"), element == "\"conductor\"", "{xml}");
         let kind = |scene: &Scene| format!("{:?}", scene.materials[0].kind);
         assert_eq!(kind(&read), kind(&ours));
-        assert_eq!(read.materials[0].surface, ours.materials[0].surface);
+        let surfaces = [&read, &ours].map(|scene| scene.materials[0].surface.clone());
+        let [read, ours] = surfaces.clone().map(|surface| Surface { color: None, ..surface });
+        assert_eq!(read, ours);
+        assert_same_values(surfaces.each_ref().map(|surface| (Vec3::ONE, &surface.color)));
     }
 }
 

@@ -286,13 +286,36 @@ fn pane_transmittance(cosine: f64) -> f64 {
     1.0 - 2.0 * side / (1.0 + side)
 }
 
+/// Texture coordinates of a square.
+const UVS: [[f32; 2]; 4] = [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]];
+
+fn white_texel() -> TextureUse {
+    let texels = Texels::Bytes(vec![[255; 4]]);
+    TextureUse::new(Arc::new(Texture { name: "w".into(), width: 1, height: 1, texels }))
+}
+
+/// Glass whose light that goes through is tinted by a texture alone.
+fn tinted_by_texture(mut glass: Material, tint: Vec3) -> Material {
+    match &mut glass.kind {
+        MaterialKind::Dielectric { transmittance, .. }
+        | MaterialKind::ThinDielectric { transmittance, .. } => *transmittance = Vec3::ONE,
+        kind => unreachable!("{kind:?}"),
+    }
+    glass.surface.color = Some(TextureUse { scale: tint.to_array(), ..white_texel() });
+    glass
+}
+
 #[test]
 fn panes_reflect_and_pass_their_tints() {
     let _alone = support::alone();
     let [reflectance, transmittance] = [Vec3::new(0.9, 0.7, 0.5), Vec3::new(0.3, 0.8, 0.6)];
     let pane = MaterialKind::ThinDielectric { ior: 1.5, reflectance, transmittance };
     let mut scene = between_sky_and_ground(pane);
-    for opacity in [1.0, 0.6] {
+    for (opacity, is_textured) in [(1.0, false), (0.6, true)] {
+        if is_textured {
+            scene.materials[0] = tinted_by_texture(scene.materials[0].clone(), transmittance);
+            scene.geometry.uvs[0] = UVS.to_vec();
+        }
         scene.materials[0].surface.opacity.factor = opacity;
         let opacity = f64::from(opacity);
         assert_channels(&format!("opacity {opacity}"), &scene, 512, 0.03, |cosine| {
@@ -314,18 +337,15 @@ fn sheets_scatter_light_through() {
     // Light of both sides that the samplers tell apart by its luminance as well.
     let [above, below] = [2.0 * SKY, 0.5 * GROUND];
     scene.environment = scenes::environment(64, |to| if to.y > 0.0 { above } else { below });
-    let texels = Texels::Bytes(vec![[255; 4]]);
-    let white =
-        TextureUse::new(Arc::new(Texture { name: "w".into(), width: 1, height: 1, texels }));
     let texels = Texels::Bytes(vec![[128, 128, 255, 255]]);
     let flat = Texture { name: "n".into(), width: 1, height: 1, texels };
     let flat = TextureUse { encoding: Encoding::Linear, ..TextureUse::new(Arc::new(flat)) };
     for is_textured in [false, true] {
         if is_textured {
-            let half = TextureUse { scale: [0.5; 3], ..white.clone() };
+            let half = TextureUse { scale: [0.5; 3], ..white_texel() };
             scene.materials[0].surface.color = Some(half);
             scene.materials[0].surface.normal = Some(flat.clone());
-            scene.geometry.uvs = [vec![[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]], Vec::new()];
+            scene.geometry.uvs[0] = UVS.to_vec();
         }
         let share = if is_textured { 0.5 } else { 1.0 };
         let few = [Sampler::Mis, Sampler::Guided];
@@ -373,6 +393,14 @@ fn glass_has_its_inside_at_the_back() {
     });
     scene.camera.position.y *= -1.0;
     assert_channels("from inside", &scene, 1, 1e-4, |_| ground);
+    let tint = Vec3::new(0.3, 0.8, 0.6);
+    scene.materials[0] = tinted_by_texture(scene.materials[0].clone(), tint);
+    scene.geometry.uvs[0] = UVS.to_vec();
+    scene.camera.position.y *= -1.0;
+    assert_channels("tinted", &scene, 512, 0.04, |cosine| {
+        let reflected = reflectance_of_glass(cosine);
+        reflected * sky + (1.0 - reflected) / 2.25 * tint.as_dvec3() * ground
+    });
 }
 
 /// A slab of glass in light that is the same from everywhere: each way through it, at the refracted angle,

@@ -227,6 +227,12 @@ fn glass_comes_back() {
     for format in [MITSUBA, PBRT, GLTF] {
         original.assert_same(format, 0.0, &[]);
     }
+    let stained = format!("{pane}\ntransmittance = {{ texture = \"colours.png\" }}");
+    let original = Original::new(&scene.replace(pane, &stained));
+    for format in [MITSUBA, GLTF] {
+        original.assert_same(format, 0.0, &[]);
+    }
+    assert!(original.again(PBRT).1[0].contains("the colours of its surface"));
 }
 
 #[test]

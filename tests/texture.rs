@@ -431,6 +431,7 @@ struct TextureAnswer {
     tangent: [f32; 4],
     color: [f32; 4],
     opacity: f32,
+    surface_color: [f32; 3],
     mapped: Vec3,
 }
 
@@ -527,12 +528,15 @@ fn compare(bits: u32) {
         let at = twin::triangle_attributes(&attributes, triangle, query.weights);
         let surface = &surfaces.surfaces[query.material as usize];
         let value = twin::texture_value(&words, &textures.uses, use_index, uv0, uv1);
-        let opacity =
-            twin::surface_opacity(&words, &textures.uses, surface, [at.uv0, at.uv1], at.color.w);
+        let uvs = [at.uv0, at.uv1];
+        let opacity = twin::surface_opacity(&words, &textures.uses, surface, uvs, at.color.w);
+        let color = at.color.truncate();
+        let color = twin::surface_color(&words, &textures.uses, surface, uvs, color);
         let number = answer.number - luminance(value.truncate());
         let is_other = !Vec4::from(answer.value).abs_diff_eq(value, 2e-4)
             || number.abs() > 2e-4
-            || (answer.opacity - opacity).abs() > 2e-4;
+            || (answer.opacity - opacity).abs() > 2e-4
+            || !Vec3::from(answer.surface_color).abs_diff_eq(color, 2e-4);
         let is_one_texel = answer.used.width * answer.used.height == 1;
         assert!(!is_one_texel || answer.value[3] == 1.0, "opaque between alike texels: {answer:?}");
         assert!(answer.uv0.abs_diff_eq(at.uv0, 1e-5), "{query:?}");

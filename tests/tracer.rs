@@ -8,7 +8,10 @@ use fenestra::{
     film::Attribute,
     gpu::{Device, Tracer},
     pass::Schedule,
-    scene::Scene,
+    scene::{
+        Scene,
+        material::{Material, MaterialKind},
+    },
     session::{Renderer, Settings},
     shader::structs::{Hit, Ray},
 };
@@ -123,6 +126,12 @@ fn picture(scene: &Scene, tracer: Tracer) -> Option<Vec<[f32; 3]>> {
 fn host_and_device_draw_the_same_picture() {
     let mut scene = shipped("reading_room");
     (scene.film.width, scene.film.height) = (64, 48);
+    let color = scene.materials.iter().find_map(|material| material.surface.color.clone());
+    let is_pane =
+        |material: &&mut Material| matches!(material.kind, MaterialKind::ThinDielectric { .. });
+    let panes = scene.materials.iter_mut().filter(is_pane);
+    let tinted = panes.map(|material| material.surface.color = color.clone()).count();
+    assert!(tinted > 0 && color.is_some());
     let Some(host) = picture(&scene, Tracer::Host) else {
         eprintln!("not tested: there is no library by which the host traces (./setup)");
         return;

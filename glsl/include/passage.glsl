@@ -16,11 +16,15 @@ struct Passing {
 
 Passing passing(uint triangle, uint instance, vec3 weights, vec3 normal) {
     uint index = triangle_material(triangle, instance);
-    float opacity =
-        surface_opacity(load_material_surface(index), triangle_attributes(triangle, weights));
+    MaterialSurface surface = load_material_surface(index);
+    Attributes attributes = triangle_attributes(triangle, weights);
+    float opacity = surface_opacity(surface, attributes);
     Material material = load_material(index);
     Passing shares = Passing(vec3(1.0 - opacity), vec3(opacity));
     if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
+        if (HAS_TINTED_PANES) {
+            material.eta = clamp(material.eta * surface_color(surface, attributes), 0.0, 1.0);
+        }
         float cosine = abs(normal.z) / max(length(normal), 1.0e-37);
         shares.passed += opacity * pane_transmittance(material, cosine);
         shares.stopped = opacity * pane_reflectance(material, cosine);

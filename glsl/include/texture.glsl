@@ -181,6 +181,12 @@ Attributes triangle_attributes(uint triangle, vec3 weights) {
     return attributes;
 }
 
+// Factor of the main colour at a point.
+vec3 surface_color(MaterialSurface surface, Attributes attributes) {
+    vec3 color = texture_value(surface.color, attributes.uv0, attributes.uv1).rgb;
+    return (surface.flags & SURFACE_VERTEX_COLOR) != 0u ? color * attributes.color.rgb : color;
+}
+
 // Share of light that the surface stops at a point, 0 to 1.
 float surface_opacity(MaterialSurface surface, Attributes attributes) {
     float opacity =

@@ -25,6 +25,7 @@ struct TextureAnswer {
     vec4 tangent;
     vec4 color;
     float opacity;
+    vec3 surface_color;
     vec3 mapped;
 };
 
@@ -40,7 +41,7 @@ TextureAnswer answer(TextureQuery query) {
         texture_value(query.use_index, query.uv0, query.uv1),
         texture_number(query.use_index, query.uv0, query.uv1), used, surface, attributes.uv0,
         attributes.uv1, attributes.tangent, attributes.color, surface_opacity(surface, attributes),
-        mapped);
+        surface_color(surface, attributes), mapped);
 }
 
 ANSWER_QUERIES(TextureQuery, TextureAnswer, answer)

@@ -38,7 +38,7 @@ use crate::{
     },
     surface::{
         SurfaceTables,
-        lookup::{AttributeWords, Words, surface_opacity},
+        lookup::{AttributeWords, Words, surface_color, surface_opacity},
     },
 };
 
@@ -158,23 +158,23 @@ impl OpenPassages<'_> {
         let own = self.triangle_materials[met.triangle as usize].load(Ordering::Relaxed);
         let index = instance.map_or(own, |of| of.material(own));
         let attributes = AttributeWords { bits: of.access.attributes, words: &self.attributes };
-        let opacity = surface_opacity(
-            &self.textures,
-            &of.uses,
-            &of.surfaces[index as usize],
-            [ATTRIBUTE_FIRST_UVS, ATTRIBUTE_SECOND_UVS]
-                .map(|set| attributes.interpolated_uv(met.triangle, weights, set)),
-            attributes.color(met.triangle, weights).w,
-        );
+        let surface = &of.surfaces[index as usize];
+        let uvs = [ATTRIBUTE_FIRST_UVS, ATTRIBUTE_SECOND_UVS]
+            .map(|set| attributes.interpolated_uv(met.triangle, weights, set));
+        let color = attributes.color(met.triangle, weights);
+        let opacity = surface_opacity(&self.textures, &of.uses, surface, uvs, color.w);
         let mut shares =
             Passing { passed: Vec3::splat(1.0 - opacity), stopped: Vec3::splat(opacity) };
-        let material = &of.materials[index as usize];
+        let mut material = of.materials[index as usize];
         if material.kind == MATERIAL_THIN_DIELECTRIC {
+            let factor = surface_color(&self.textures, &of.uses, surface, uvs, color.truncate());
+            material.eta =
+                (Vec3::from(material.eta) * factor).clamp(Vec3::ZERO, Vec3::ONE).to_array();
             let [a, b, c] = local;
             let normal = (b - a).cross(c - a);
             let cosine = normal.z.abs() / normal.length().max(1e-37);
-            shares.passed += opacity * pane_transmittance(material, cosine);
-            shares.stopped = opacity * pane_reflectance(material, cosine);
+            shares.passed += opacity * pane_transmittance(&material, cosine);
+            shares.stopped = opacity * pane_reflectance(&material, cosine);
         }
         shares
     }

@@ -6,7 +6,7 @@ use crate::{
     shader::constants::{
         CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, SPECULAR_KINDS, SURFACES_ANISOTROPIC,
         SURFACES_EMITTING, SURFACES_ONE_SIDED, SURFACES_PASSING, SURFACES_SPECULAR,
-        SURFACES_TEXTURED,
+        SURFACES_TEXTURED, SURFACES_TINTED_PANES,
     },
 };
 
@@ -57,10 +57,11 @@ fn features_of(material: &Material) -> u32 {
     let is_pane = matches!(material.kind, MaterialKind::ThinDielectric { .. });
     let is_opaque =
         surface.opacity.factor >= 1.0 && surface.opacity.texture.is_none() && !surface.vertex_color;
+    let is_tinted = surface.color.is_some() || surface.vertex_color;
     let is_anisotropic = surface.anisotropy.strength > 0.0;
-    let is_textured = surface.vertex_color
+    let is_textured = is_tinted
         || is_anisotropic
-        || [&surface.color, &surface.roughness, &surface.metallic, &surface.normal]
+        || [&surface.roughness, &surface.metallic, &surface.normal]
             .iter()
             .any(|texture| texture.is_some());
     [
@@ -69,6 +70,7 @@ fn features_of(material: &Material) -> u32 {
         (SURFACES_ONE_SIDED, !surface.two_sided),
         (SURFACES_TEXTURED, is_textured),
         (SURFACES_ANISOTROPIC, is_anisotropic),
+        (SURFACES_TINTED_PANES, is_pane && is_tinted),
         (SURFACES_EMITTING, surface.emission.is_some()),
     ]
     .into_iter()

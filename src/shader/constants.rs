@@ -150,6 +150,8 @@ constants! {
     SURFACES_LAMP_CELLS = 64;
     /// Some widths of GGX differ by direction.
     SURFACES_ANISOTROPIC = 128;
+    /// Textures or vertex colours tint some thin panes.
+    SURFACES_TINTED_PANES = 256;
 
     // Dimensions of random numbers that the host draws too.
     /// First dimension of the first vertex of a path.

@@ -156,7 +156,7 @@ structs! {
 
     /// Properties of the surface at a hit that textures vary.
     struct Surface {
-        /// [`Material::reflectance`] there.
+        /// [`Material::reflectance`] there; of glass [`Material::eta`].
         reflectance: vec3,
         /// GGX width α there.
         alpha: float,

@@ -147,6 +147,18 @@ impl<W: Words + ?Sized> AttributeWords<'_, W> {
     }
 }
 
+/// Factor of the main colour at a point; `vertex` is the vertices' colour there.
+pub fn surface_color<W: Words + ?Sized>(
+    words: &W,
+    uses: &[TextureUse],
+    surface: &MaterialSurface,
+    [uv0, uv1]: [Vec2; 2],
+    vertex: Vec3,
+) -> Vec3 {
+    let color = texture_value(words, uses, surface.color, uv0, uv1).truncate();
+    if surface.flags & SURFACE_VERTEX_COLOR != 0 { color * vertex } else { color }
+}
+
 /// Share of light that a surface stops at a point, 0 to 1; `alpha` is the vertices' opacity there.
 pub fn surface_opacity<W: Words + ?Sized>(
     words: &W,

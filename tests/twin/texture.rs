@@ -1,7 +1,9 @@
 //! Tangents, normal maps and attributes of triangles: twin of the parts of `glsl/include/texture.glsl` that
 //! the library does without, in the same order and with the same names.
 
-pub use fenestra::surface::lookup::{image_coordinates, surface_opacity, texture_value};
+pub use fenestra::surface::lookup::{
+    image_coordinates, surface_color, surface_opacity, texture_value,
+};
 use fenestra::{
     accel::attributes::TriangleAttributes,
     math::octahedron,

@@ -43,7 +43,6 @@ features! {
     GLTF_SPECULAR_TEXTURE "textures of `KHR_materials_specular`" "their means";
     GLTF_LOW_TRANSMISSION "transmission of less than half the light" "the surface is opaque";
     GLTF_TRANSMISSION_TEXTURE "texture of transmission" "a triangle is glass or opaque by its mean there";
-    GLTF_GLASS_COLOR "base colour texture of glass" "its mean tints it";
     GLTF_THIN_ROUGHNESS "roughness of thin glass" "a pane is smooth";
     GLTF_GLOSSINESS_TEXTURE
         "specular texture of `KHR_materials_pbrSpecularGlossiness` on other coordinates than the diffuse one"
@@ -174,7 +173,7 @@ features! {
         "their mean, or the image of `alpha_u`";
     MI_ALPHA_TEXTURE "`alpha` of vertices" "0.1";
     MI_SPECULAR "`specular_reflectance` of plastic" "white";
-    MI_SPECULAR_TEXTURE "textures of `specular_reflectance` and `specular_transmittance` of dielectrics"
+    MI_SPECULAR_TEXTURE "textures of `specular_reflectance` of dielectrics, or of glass that is `principled`"
         "white";
     MI_SPOT_TEXTURE "`texture` of a `spot`" "its mean over the whole cone";
     MI_EMITTER "other emitters, by name" "left out";

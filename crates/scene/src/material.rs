@@ -287,7 +287,10 @@ impl MaterialKind {
                 own.metallic = (own.metallic * metal).clamp(0.0, 1.0);
                 own.roughness = (own.roughness * rough).clamp(0.0, 1.0);
             }
-            Self::Dielectric { .. } | Self::ThinDielectric { .. } | Self::Measured { .. } => {}
+            Self::Dielectric { transmittance, .. } | Self::ThinDielectric { transmittance, .. } => {
+                tint(transmittance)
+            }
+            Self::Measured { .. } => {}
         }
         kind
     }

@@ -194,11 +194,12 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
         r#", "images": [{{"uri": "data:image/png;base64,{inline}"}}], "textures": [{{"source": 0}}]"#
     );
     let material = format!(
-        r#"{{"pbrMetallicRoughness": {{"metallicRoughnessTexture": {{"index": 0}}}},
-        "extensions": {{{glass}}}}}"#
+        r#"{{"pbrMetallicRoughness": {{"metallicRoughnessTexture": {{"index": 0}},
+        "baseColorTexture": {{"index": 0}}}}, "extensions": {{{glass}}}}}"#
     );
-    let (found, _) = gltf_material(&folder, &material, &images);
+    let (found, warnings) = gltf_material(&folder, &material, &images);
     assert!(matches!(found.kind, MaterialKind::ThinDielectric { .. }), "{found:?}");
+    assert_eq!((found.surface.color.unwrap().encoding, warnings.len()), (Encoding::Srgb, 0));
     let (found, warnings) = with(&glass.replace("Factor\": 1", "Factor\": 0.4"), smooth);
     assert!(matches!(found.kind, MaterialKind::Principled(_)) && warnings.len() == 1);
 
@@ -1069,6 +1070,12 @@ fn mtl_materials_become_surfaces() {
     let pane = kind("Kd 0.5 1 1\nKs 1 1 1\nd 0.2\nNi 1.4\nillum 7");
     let MaterialKind::ThinDielectric { ior, transmittance, .. } = pane else { panic!("{pane:?}") };
     assert!(ior == 1.4 && close(transmittance, [0.9, 1.0, 1.0]), "{transmittance}");
+    let keys = "Kd 0.5 1 1\nmap_Kd maps/leaf green.png\nd 0.2\nKs 1 1 1\nillum 7";
+    let pane = mtl_material(&folder, keys).0;
+    let image = pane.surface.color.unwrap();
+    assert!(close(image.scale.into(), [0.1, 0.2, 0.2]) && close(image.bias.into(), [0.8; 3]));
+    let filtered = mtl_material(&folder, &format!("{keys}\nTf 0.1 0.2 0.3")).0;
+    assert!(filtered.surface.color.is_none(), "{filtered:?}");
     let reflectance = Vec3::new(0.9, 0.8, 0.7);
     let mirror = kind("Kd 0 0 0\nKs 0.9 0.8 0.7\nillum 3");
     assert!(matches!(mirror, MaterialKind::Mirror { reflectance: found } if found == reflectance));

@@ -351,6 +351,12 @@ fn models_become_materials() {
     );
     let MaterialKind::Dielectric { ior, alpha, .. } = glass.kind else { panic!() };
     assert!((ior - 1.333 / 1.5046).abs() < 1e-6 && alpha == 0.0 && glass.surface.two_sided);
+    let (stained, warnings) = material(
+        r#"<bsdf type="thindielectric"><texture type="checkerboard" name="specular_transmittance">
+        <rgb name="color0" value="0.2 0.4 0.6"/></texture></bsdf>"#,
+    );
+    let surface = stained.surface;
+    assert!(surface.two_sided && surface.color.is_some() && warnings.is_empty(), "{warnings:?}");
     let (pane, _) = material(r#"<bsdf type="thindielectric"/>"#);
     let MaterialKind::ThinDielectric { ior, .. } = pane.kind else { panic!() };
     assert!((ior - 1.50418).abs() < 1e-5, "Mitsuba 3.9.1 says 1.50418: {ior}");

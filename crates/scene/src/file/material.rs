@@ -166,6 +166,10 @@ fn default_factor() -> [f32; 3] {
     [1.0, 1.0, 1.0]
 }
 
+fn default_transmittance() -> Textured<[f32; 3]> {
+    Textured::Uniform([1.0, 1.0, 1.0])
+}
+
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MirrorEntry {
@@ -187,8 +191,8 @@ pub(crate) struct DielectricEntry {
     #[serde(default = "default_factor")]
     pub reflectance: [f32; 3],
     /// Factor of the transmitted light, 0…1.
-    #[serde(default = "default_factor")]
-    pub transmittance: [f32; 3],
+    #[serde(default = "default_transmittance")]
+    pub transmittance: Textured<[f32; 3]>,
     /// Absorption coefficient of the inside, per metre, 0…1e6.
     #[serde(default)]
     pub absorption: [f32; 3],
@@ -204,8 +208,8 @@ pub(crate) struct ThinDielectricEntry {
     #[serde(default = "default_factor")]
     pub reflectance: [f32; 3],
     /// Factor of the transmitted light, 0…1.
-    #[serde(default = "default_factor")]
-    pub transmittance: [f32; 3],
+    #[serde(default = "default_transmittance")]
+    pub transmittance: Textured<[f32; 3]>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -233,9 +237,9 @@ impl MaterialEntry {
                 (entry.base_color.texture(), entry.roughness.texture(), entry.metallic.texture())
             }
             MaterialKindEntry::Mirror(entry) => (entry.reflectance.texture(), None, None),
-            MaterialKindEntry::Dielectric(_)
-            | MaterialKindEntry::ThinDielectric(_)
-            | MaterialKindEntry::Measured(_) => (None, None, None),
+            MaterialKindEntry::Dielectric(entry) => (entry.transmittance.texture(), None, None),
+            MaterialKindEntry::ThinDielectric(entry) => (entry.transmittance.texture(), None, None),
+            MaterialKindEntry::Measured(_) => (None, None, None),
         };
         let opacity = keys.opacity.as_ref().and_then(Textured::texture);
         let emission = keys.emission.as_ref().and_then(Textured::texture);

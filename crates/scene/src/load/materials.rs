@@ -233,7 +233,7 @@ impl Reader<'_> {
                     ior,
                     alpha,
                     reflectance: self.vector("reflectance", entry.reflectance, SHARE)?,
-                    transmittance: self.vector("transmittance", entry.transmittance, SHARE)?,
+                    transmittance: self.share("transmittance", &entry.transmittance)?,
                     absorption,
                 }
             }
@@ -242,7 +242,7 @@ impl Reader<'_> {
                 MaterialKind::ThinDielectric {
                     ior: entry.ior,
                     reflectance: self.vector("reflectance", entry.reflectance, SHARE)?,
-                    transmittance: self.vector("transmittance", entry.transmittance, SHARE)?,
+                    transmittance: self.share("transmittance", &entry.transmittance)?,
                 }
             }
             MaterialKindEntry::Measured(entry) => {

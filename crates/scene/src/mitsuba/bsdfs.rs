@@ -387,21 +387,20 @@ impl Reader {
     /// Glass; `alpha` is none for a thin sheet.
     fn dielectric(&mut self, parameters: &Parameters<'_>, alpha: Option<f32>) -> Result<Material> {
         let ior = self.ior(parameters, "bk7")?;
-        let mut color = |name: &str| {
-            let value = self.value(parameters, name, Role::Reflectance)?;
-            let feature = features::MI_SPECULAR_TEXTURE;
-            let color = self.without_texture(value, parameters.node, feature);
-            Ok(color.unwrap_or(Vec3::ONE))
-        };
-        let reflectance = color("specular_reflectance")?;
-        let transmittance = color("specular_transmittance")?;
-        let absorption = Vec3::ZERO;
-        let kind = match alpha {
-            Some(alpha) => {
-                MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption }
-            }
-            None => MaterialKind::ThinDielectric { ior, reflectance, transmittance },
-        };
-        Ok(Material::new("", kind))
+        let reflected = self.value(parameters, "specular_reflectance", Role::Reflectance)?;
+        let feature = features::MI_SPECULAR_TEXTURE;
+        let reflectance = self.without_texture(reflected, parameters.node, feature);
+        let reflectance = reflectance.unwrap_or(Vec3::ONE);
+        let passed = self.value(parameters, "specular_transmittance", Role::Reflectance)?;
+        let mut model =
+            colored(passed.unwrap_or(Value::Constant(Vec3::ONE)), |transmittance| match alpha {
+                Some(alpha) => {
+                    let absorption = Vec3::ZERO;
+                    MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption }
+                }
+                None => MaterialKind::ThinDielectric { ior, reflectance, transmittance },
+            });
+        model.surface.two_sided = true;
+        Ok(model)
     }
 }

@@ -41,7 +41,6 @@ impl<'a> Translator<'a> {
         }
         let color = match &surface.emission {
             Some(light) if is_unlit => light.texture.as_ref(),
-            _ if self.subject.material.kind.is_glass() => None,
             _ => surface.color.as_ref(),
         };
         self.pbr(&core, color);
@@ -200,7 +199,6 @@ impl<'a> Translator<'a> {
         if reflectance != Vec3::ONE {
             self.subject.warn("the factor of its reflected light has no place in glTF's glass");
         }
-        self.subject.without_color("dielectric");
         self.dielectric(ior, 1.0, Vec3::ONE);
         self.extension("KHR_materials_transmission", json!({"transmissionFactor": 1.0}));
         core(transmittance, 0.0, roughness)

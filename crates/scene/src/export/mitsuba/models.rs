@@ -159,8 +159,7 @@ impl Translator<'_> {
                 element("conductor", &content)
             }
             MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, .. } => {
-                self.subject.without_color("dielectric");
-                let glass = glass(*ior, *reflectance, *transmittance);
+                let glass = self.glass(*ior, *reflectance, *transmittance);
                 if *alpha > 0.0 {
                     self.warn_of_masking(*alpha, "dielectric");
                     element("roughdielectric", &(self.ggx(*alpha) + &glass))
@@ -169,8 +168,7 @@ impl Translator<'_> {
                 }
             }
             MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
-                self.subject.without_color("dielectric");
-                element("thindielectric", &glass(*ior, *reflectance, *transmittance))
+                element("thindielectric", &self.glass(*ior, *reflectance, *transmittance))
             }
             MaterialKind::Measured { path, table } => match table.rgl {
                 Some(traits) => self.measured(path, traits),
@@ -243,6 +241,14 @@ impl Translator<'_> {
             return texture("mesh_attribute", name, &content);
         }
         rgb(name, factor)
+    }
+
+    /// Parameters of a dielectric in air.
+    fn glass(&mut self, ior: f32, reflectance: Vec3, transmittance: Vec3) -> String {
+        float("int_ior", ior)
+            + &float("ext_ior", 1.0)
+            + &rgb("specular_reflectance", reflectance)
+            + &self.color("specular_transmittance", transmittance)
     }
 
     fn number(&mut self, name: &str, factor: f32, used: Option<&TextureUse>) -> String {
@@ -353,14 +359,6 @@ impl Translator<'_> {
         let emitter = format!("<emitter type=\"area\">\n{radiance}</emitter>\n");
         (emitter, emission.two_sided && can_have_back)
     }
-}
-
-/// Parameters of a dielectric in air.
-fn glass(ior: f32, reflectance: Vec3, transmittance: Vec3) -> String {
-    float("int_ior", ior)
-        + &float("ext_ior", 1.0)
-        + &rgb("specular_reflectance", reflectance)
-        + &rgb("specular_transmittance", transmittance)
 }
 
 fn element(kind: &str, content: &str) -> String {

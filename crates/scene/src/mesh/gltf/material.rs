@@ -348,9 +348,7 @@ impl GltfReader<'_> {
             reading.ignore_if(is_lost, features::GLTF_LOW_TRANSMISSION);
             return Ok(());
         }
-        reading.ignore_if(found.surface.color.is_some(), features::GLTF_GLASS_COLOR);
-        let tint = found.base_color * Vec3::from(mean(&found.surface.color).unwrap_or([1.0; 3]));
-        found.surface.color = None;
+        let tint = found.base_color;
         found.surface.metallic = None;
         let volume = &json["extensions"]["KHR_materials_volume"];
         let thickness = number(volume, "thicknessFactor", 0.0);

@@ -114,8 +114,16 @@ impl LibraryMaterial {
                 ..Principled::default()
             })
         } else if is_pane {
-            let tint = Vec3::ONE.lerp(diffuse, opacity);
-            let transmittance = self.filter.unwrap_or(tint);
+            // The image varies the colour of what the pane does not let through.
+            let mut transmittance = self.filter.unwrap_or(Vec3::ONE.lerp(diffuse, opacity));
+            if self.filter.is_some() {
+                surface.color = None;
+            } else if let Some(image) = &mut surface.color {
+                transmittance = Vec3::ONE;
+                image.scale = (opacity * diffuse * Vec3::from(image.scale)).to_array();
+                image.bias =
+                    (opacity * diffuse * Vec3::from(image.bias) + (1.0 - opacity)).to_array();
+            }
             MaterialKind::ThinDielectric { ior, reflectance: Vec3::ONE, transmittance }
         } else if is_glossy && matches!(self.model, 3 | 5) && diffuse.max_element() <= BLACK {
             MaterialKind::Mirror { reflectance: self.specular }
