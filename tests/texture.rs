@@ -595,6 +595,14 @@ fn textures_of_one_value_are_factors() {
         alpha,
         fresnel: ConductorFresnel::Schlick { reflectance },
     };
+    let copper = |alpha, reflectance| MaterialKind::Conductor {
+        alpha,
+        fresnel: ConductorFresnel::Exact {
+            reflectance,
+            eta: vec3(0.27, 1.03, 1.17),
+            k: vec3(3.41, 2.58, 2.42),
+        },
+    };
     let (full, half) = (vec3(0.8, 0.6, 0.4), vec3(0.4, 0.15, 1.0));
     let of = |kind| Material::new("m", kind);
     let mut plain = vec![
@@ -620,6 +628,9 @@ fn textures_of_one_value_are_factors() {
         material.surface.metallic = used([0.25; 3]);
     }
     for strength in [0.0, 0.4] {
+        if strength > 0.0 {
+            (plain[1].kind, textured[1].kind) = (copper(0.2, half), copper(0.8, full));
+        }
         let of = |strength, direction| Anisotropy { strength, rotation: 0.7, direction };
         plain[2].surface.anisotropy = of(strength, None);
         textured[2].surface.anisotropy = of(2.0 * strength, used([1.0, 0.5, 0.5]));

@@ -400,7 +400,8 @@ void brdf_evaluate_and_pdf(
             cover(reflector, incident_local, half_vector, cosine_difference, value, pdf);
         }
     } else if (is_kind(material, MATERIAL_CONDUCTOR) && material.ior > 0.0) {
-        value = reflection * fresnel_conductor(cosine_difference, material.eta, material.k);
+        value = reflection * material.reflectance
+            * fresnel_conductor(cosine_difference, material.eta, material.k);
     } else if (is_kind(material, MATERIAL_CONDUCTOR)) {
         value = reflection * fresnel_schlick(cosine_difference, material.reflectance);
     } else {
@@ -493,8 +494,9 @@ vec3 brdf_albedo(Material material, vec3 outgoing_local) {
     if (!is_kind(material, MATERIAL_CONDUCTOR) && !is_kind(material, MATERIAL_MEASURED)) {
         return vec3(0.0);
     }
-    return vec3(
+    vec3 albedo = vec3(
         cosine_table(offset, 3u, outgoing_local.z),
         cosine_table(offset + 1u, 3u, outgoing_local.z),
         cosine_table(offset + 2u, 3u, outgoing_local.z));
+    return is_kind(material, MATERIAL_CONDUCTOR) ? material.reflectance * albedo : albedo;
 }

@@ -120,7 +120,7 @@ pub(crate) fn sheen_words(strength: f32, alpha: f32) -> Vec<u32> {
     cover_tables(strength, albedo).concat().into_iter().map(f32::to_bits).collect()
 }
 
-/// Words of a conductor with exact Fresnel: directional albedo.
+/// Words of a conductor with exact Fresnel: directional albedo without the factor of reflected light.
 pub(crate) fn conductor_words(alpha: f32, eta: Vec3, k: Vec3) -> Vec<u32> {
     let fresnel = |cosine: f32| fresnel_conductor(cosine, eta, k);
     (0..BRDF_COSINE_NODES)

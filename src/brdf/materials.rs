@@ -85,8 +85,9 @@ impl MaterialTables {
                             converted.reflectance = reflectance.to_array();
                             converted.table_offset = ggx_table(&mut tables);
                         }
-                        ConductorFresnel::Exact { eta, k } => {
+                        ConductorFresnel::Exact { reflectance, eta, k } => {
                             converted.ior = 1.0;
+                            converted.reflectance = reflectance.to_array();
                             converted.eta = eta.to_array();
                             converted.k = k.to_array();
                             let words = conductor_words(converted.alpha, *eta, *k);

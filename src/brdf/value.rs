@@ -100,7 +100,7 @@ pub fn brdf_evaluate(
         }
         MATERIAL_CONDUCTOR if material.ior > 0.0 => {
             let (eta, k) = (Vec3::from(material.eta), Vec3::from(material.k));
-            reflection * fresnel_conductor(cosine_difference, eta, k)
+            reflection * reflectance * fresnel_conductor(cosine_difference, eta, k)
         }
         MATERIAL_CONDUCTOR => reflection * fresnel_schlick(cosine_difference, reflectance),
         MATERIAL_MIRROR | MATERIAL_DIELECTRIC | MATERIAL_THIN_DIELECTRIC => Vec3::ZERO,

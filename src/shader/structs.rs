@@ -401,8 +401,8 @@ structs! {
         /// Refractive index of a dielectric; for conductors 1 selects exact Fresnel, 0 Schlick;
         /// share of metal in a principled material.
         ior: float,
-        /// Diffuse albedo, base colour, factor of reflected light, or reflectance at normal incidence
-        /// of a Schlick conductor.
+        /// Diffuse albedo, base colour, factor of reflected light, also of an exact conductor, or reflectance
+        /// at normal incidence of a Schlick conductor.
         reflectance: vec3,
         /// Refractive index of a conductor, factor of light transmitted by a dielectric, or
         /// reflectance of a principled dielectric at normal incidence.

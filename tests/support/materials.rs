@@ -67,8 +67,11 @@ fn brushed(mut case: Case, strength: f32, rotation: f32) -> Case {
 }
 
 /// Gold near 600, 550 and 450 nm.
-const GOLD: ConductorFresnel =
-    ConductorFresnel::Exact { eta: vec3(0.18, 0.42, 1.37), k: vec3(3.42, 2.35, 1.77) };
+const GOLD: ConductorFresnel = ConductorFresnel::Exact {
+    reflectance: vec3(0.9, 1.0, 0.8),
+    eta: vec3(0.18, 0.42, 1.37),
+    k: vec3(3.42, 2.35, 1.77),
+};
 
 /// Tabulates a plastic, so that energy, reciprocity and every cell are known.
 fn synthetic_table(diffuse: Vec3, alpha: f32) -> Arc<MeasuredTable> {

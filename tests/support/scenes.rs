@@ -26,6 +26,7 @@ pub fn plastic(alpha: f32) -> Material {
 /// Makes copper (Johnson & Christy 1972, refractive index near 630, 532 and 465 nm).
 pub fn copper(alpha: f32) -> Material {
     let fresnel = ConductorFresnel::Exact {
+        reflectance: Vec3::ONE,
         eta: Vec3::new(0.27, 1.03, 1.17),
         k: Vec3::new(3.41, 2.58, 2.42),
     };

@@ -244,11 +244,15 @@ pub fn brdf_albedo(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
         MATERIAL_THIN_DIELECTRIC => {
             pane_reflectance(material, cosine) + pane_transmittance(material, cosine)
         }
-        MATERIAL_CONDUCTOR | MATERIAL_MEASURED => vec3(
-            cosine_table(brdf_table, offset, 3, cosine),
-            cosine_table(brdf_table, offset + 1, 3, cosine),
-            cosine_table(brdf_table, offset + 2, 3, cosine),
-        ),
+        MATERIAL_CONDUCTOR | MATERIAL_MEASURED => {
+            let factor = if material.kind == MATERIAL_CONDUCTOR { reflectance } else { Vec3::ONE };
+            factor
+                * vec3(
+                    cosine_table(brdf_table, offset, 3, cosine),
+                    cosine_table(brdf_table, offset + 1, 3, cosine),
+                    cosine_table(brdf_table, offset + 2, 3, cosine),
+                )
+        }
         kind => panic!("material of the unknown kind {kind}"),
     }
 }

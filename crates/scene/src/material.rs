@@ -196,6 +196,8 @@ pub enum ConductorFresnel {
     },
     /// Exact Fresnel equations.
     Exact {
+        /// Factor of the reflected light, 0…1.
+        reflectance: Vec3,
         /// Real part of the refractive index per colour channel.
         eta: Vec3,
         /// Extinction coefficient per colour channel.
@@ -208,9 +210,9 @@ impl ConductorFresnel {
     pub fn at_normal_incidence(&self) -> Vec3 {
         match *self {
             Self::Schlick { reflectance } => reflectance,
-            Self::Exact { eta, k } => {
+            Self::Exact { reflectance, eta, k } => {
                 let (below, above) = (eta - 1.0, eta + 1.0);
-                (below * below + k * k) / (above * above + k * k)
+                reflectance * (below * below + k * k) / (above * above + k * k)
             }
         }
     }
@@ -235,7 +237,12 @@ impl MaterialKind {
             Self::Conductor { alpha, fresnel } => {
                 let (number, colors) = match fresnel {
                     ConductorFresnel::Schlick { reflectance } => (2, colors(&[reflectance])),
-                    ConductorFresnel::Exact { eta, k } => (3, colors(&[eta, k])),
+                    ConductorFresnel::Exact { reflectance: Vec3::ONE, eta, k } => {
+                        (3, colors(&[eta, k]))
+                    }
+                    ConductorFresnel::Exact { reflectance, eta, k } => {
+                        (3, colors(&[eta, k, reflectance]))
+                    }
                 };
                 ("conductor", number, vec![vec![*alpha], colors])
             }
@@ -278,9 +285,9 @@ impl MaterialKind {
             }
             Self::Conductor { alpha, fresnel } => {
                 *alpha = (*alpha * rough * rough).clamp(0.0, 1.0);
-                if let ConductorFresnel::Schlick { reflectance } = fresnel {
-                    tint(reflectance);
-                }
+                let (ConductorFresnel::Schlick { reflectance }
+                | ConductorFresnel::Exact { reflectance, .. }) = fresnel;
+                tint(reflectance);
             }
             Self::Principled(own) => {
                 tint(&mut own.base_color);

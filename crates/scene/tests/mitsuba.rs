@@ -302,7 +302,7 @@ fn models_become_materials() {
         r#"<bsdf type="twosided"><bsdf type="roughconductor"><string name="material" value="Cu"/>
         <float name="alphaU" value="0.1"/><float name="alphaV" value="0.3"/></bsdf></bsdf>"#,
     );
-    let MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } =
+    let MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k, .. } } =
         copper.kind
     else {
         panic!()
@@ -316,7 +316,7 @@ fn models_become_materials() {
         r#"<bsdf type="conductor"><string name="material" value="Cu"/>
         <float name="ext_eta" value="2"/></bsdf>"#,
     );
-    let MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { eta, k }, .. } = sunk.kind
+    let MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { eta, k, .. }, .. } = sunk.kind
     else {
         panic!()
     };
@@ -336,12 +336,20 @@ fn models_become_materials() {
         r#"<bsdf type="conductor"><rgb name="eta" value="1"/><rgb name="k" value="2"/>
         <rgb name="specular_reflectance" value="0.5"/></bsdf>"#,
     );
-    let MaterialKind::Conductor { fresnel: ConductorFresnel::Schlick { reflectance }, .. } =
-        dull.kind
-    else {
-        panic!()
+    let MaterialKind::Conductor { fresnel, .. } = dull.kind else { panic!() };
+    assert_close(fresnel.at_normal_incidence(), Vec3::splat(0.25));
+    let expected = ConductorFresnel::Exact {
+        reflectance: Vec3::splat(0.5),
+        eta: Vec3::ONE,
+        k: Vec3::splat(2.0),
     };
-    assert_close(reflectance, Vec3::splat(0.25));
+    assert_eq!(fresnel, expected);
+    let (ideal, _) = material(
+        r#"<bsdf type="roughconductor"><string name="material" value="none"/>
+        <texture type="checkerboard" name="specular_reflectance"/></bsdf>"#,
+    );
+    let MaterialKind::Conductor { fresnel, .. } = ideal.kind else { panic!() };
+    assert!(fresnel.at_normal_incidence().min_element() > 0.9995 && ideal.surface.color.is_some());
     let (mirror, _) =
         material(r#"<bsdf type="conductor"><string name="material" value="none"/></bsdf>"#);
     assert!(matches!(mirror.kind, MaterialKind::Mirror { reflectance: Vec3::ONE }));

@@ -326,7 +326,7 @@ fn materials_are_the_nearest() {
         };
         assert_eq!(alpha, expected);
     }
-    let MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } =
+    let MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k, .. } } =
         material(r#""conductor" "rgb eta" [1.6 0.8 0.5] "spectrum k" "metal-Ag-k""#).kind
     else {
         panic!()
@@ -369,7 +369,7 @@ fn materials_are_the_nearest() {
     let mean = image.materials[0].surface.color.as_ref().unwrap().mean()[0];
     assert!((mean - 17.0 / 41.0).abs() < 0.01, "{mean}");
     // η = 1 and k = 2√r/√(1 − r) reflect r at normal incidence.
-    let MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { eta, k }, .. } =
+    let MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { eta, k, .. }, .. } =
         material(r#""conductor" "rgb reflectance" [0.5 1 0]"#).kind
     else {
         panic!()

@@ -185,6 +185,7 @@ fn materials_take_every_form() {
         alpha = 0.1
         eta = [0.14, 0.37, 1.44]
         k = [3.98, 2.38, 1.6]
+        reflectance = [0.9, 0.8, 0.7]
         [[material]]
         name = \"steel\"
         type = \"conductor\"
@@ -195,10 +196,13 @@ fn materials_take_every_form() {
     let kinds: Vec<_> = scene.materials.iter().map(|material| &material.kind).collect();
     assert!(matches!(kinds[1], MaterialKind::Plastic { alpha, ior, .. }
         if *alpha == 0.25 && *ior == 1.5));
-    assert!(
-        matches!(kinds[2], MaterialKind::Conductor { fresnel: ConductorFresnel::Exact { k, .. }, .. }
-        if k.x == 3.98)
-    );
+    let MaterialKind::Conductor { fresnel, .. } = kinds[2] else { unreachable!() };
+    let expected = ConductorFresnel::Exact {
+        reflectance: Vec3::new(0.9, 0.8, 0.7),
+        eta: Vec3::new(0.14, 0.37, 1.44),
+        k: Vec3::new(3.98, 2.38, 1.6),
+    };
+    assert_eq!(*fresnel, expected);
     assert!(matches!(
         kinds[3],
         MaterialKind::Conductor { fresnel: ConductorFresnel::Schlick { .. }, .. }
@@ -437,11 +441,11 @@ fn numbers_that_cannot_be_rendered_are_refused_by_name() {
     );
     case(
         &material("type = \"conductor\"\nalpha = 0.1"),
-        "a conductor needs either reflectance, or eta and k",
+        "a conductor needs reflectance, or eta and k, or all three",
     );
     case(
         &material("type = \"conductor\"\nalpha = 0.1\neta = [1, 1, 1]"),
-        "either reflectance, or eta and k",
+        "a conductor needs reflectance, or eta and k",
     );
     case(
         &material("type = \"conductor\"\nalpha = 0.1\neta = [0, 1, 1]\nk = [1, 1, 1]"),

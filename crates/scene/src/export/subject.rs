@@ -48,15 +48,6 @@ impl<'a> Subject<'a> {
         self.warnings.push(format!("material `{}`: {difference}", self.material.name));
     }
 
-    /// Names colours that a model of `kind` has no place for.
-    pub(super) fn without_color(&mut self, kind: &str) {
-        if self.surface.color.is_some() || self.triangles.has_colors {
-            self.warn(&format!(
-                "the colours of its surface or its vertices have no place in a {kind}"
-            ));
-        }
-    }
-
     /// Reflectance of the diffuse surface that stands for a measured one.
     pub(super) fn measured(&mut self, path: &Path, table: &MeasuredTable) -> Vec3 {
         let share = reflected_share(table);

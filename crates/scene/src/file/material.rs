@@ -101,7 +101,7 @@ fn default_ior() -> f32 {
     1.5
 }
 
-/// Keys of a `conductor` material; either `reflectance` or `eta` and `k`.
+/// Keys of a `conductor` material; `reflectance`, or `eta` and `k`, or all three.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ConductorEntry {
@@ -109,7 +109,7 @@ pub(crate) struct ConductorEntry {
     pub alpha: Option<f32>,
     /// √α.
     pub roughness: Option<Textured<f32>>,
-    /// Reflectance at normal incidence, 0…1 (Schlick); this, or `eta` and `k`.
+    /// Reflectance at normal incidence, 0…1 (Schlick); factor of the reflected light beside `eta` and `k`.
     pub reflectance: Option<Textured<[f32; 3]>>,
     /// Real part of the refractive index (exact Fresnel).
     pub eta: Option<[f32; 3]>,

@@ -172,12 +172,16 @@ impl Reader<'_> {
                     (Some(value), None, None) => {
                         ConductorFresnel::Schlick { reflectance: self.share("reflectance", value)? }
                     }
-                    (None, Some(eta), Some(k)) => ConductorFresnel::Exact {
+                    (value, Some(eta), Some(k)) => ConductorFresnel::Exact {
+                        reflectance: match value {
+                            Some(value) => self.share("reflectance", value)?,
+                            None => Vec3::ONE,
+                        },
                         eta: self.vector("eta", eta, (0.01, 100.0))?,
                         k: self.vector("k", k, (0.0, 100.0))?,
                     },
                     _ => {
-                        let message = "a conductor needs either reflectance, or eta and k";
+                        let message = "a conductor needs reflectance, or eta and k, or all three";
                         return Err(self.error(message));
                     }
                 };

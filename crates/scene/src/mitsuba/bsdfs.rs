@@ -28,6 +28,9 @@ fn one_sided(kind: MaterialKind) -> Material {
     Material { name: String::new(), kind, surface }
 }
 
+/// Extinction coefficient of a metal that reflects more than 0.9996 of the light at all angles.
+const IDEAL_EXTINCTION: Vec3 = Vec3::splat(100.0);
+
 /// Material whose first factor is `value`.
 pub(super) fn colored(value: Value, kind: impl FnOnce(Vec3) -> MaterialKind) -> Material {
     let is_of_vertices = matches!(value, Value::Vertices(_));
@@ -362,25 +365,16 @@ impl Reader {
         };
         let value = self.value_or(parameters, "specular_reflectance", Role::Reflectance, 1.0)?;
         let width = alpha.unwrap_or(MIN_ALPHA);
-        let Some((eta, k)) = metal else {
-            return Ok(colored(value, |reflectance| match alpha {
-                None => MaterialKind::Mirror { reflectance },
-                Some(alpha) => MaterialKind::Conductor {
-                    alpha,
-                    // An ideal mirror reflects the same at all angles only if it is white.
-                    fresnel: ConductorFresnel::Schlick { reflectance },
-                },
-            }));
+        let (eta, k) = match metal {
+            Some((eta, k)) => (eta.max(Vec3::splat(0.01)) / outside, k / outside),
+            None if alpha.is_none() => {
+                return Ok(colored(value, |reflectance| MaterialKind::Mirror { reflectance }));
+            }
+            None => (Vec3::ONE, IDEAL_EXTINCTION),
         };
-        let (eta, k) = (eta.max(Vec3::splat(0.01)) / outside, k / outside);
-        let fresnel = ConductorFresnel::Exact { eta, k };
-        if matches!(value, Value::Constant(Vec3::ONE)) {
-            return Ok(one_sided(MaterialKind::Conductor { alpha: width, fresnel }));
-        }
-        let normal = fresnel.at_normal_incidence();
-        Ok(colored(value, |factor| MaterialKind::Conductor {
+        Ok(colored(value, |reflectance| MaterialKind::Conductor {
             alpha: width,
-            fresnel: ConductorFresnel::Schlick { reflectance: factor * normal },
+            fresnel: ConductorFresnel::Exact { reflectance, eta, k },
         }))
     }
 

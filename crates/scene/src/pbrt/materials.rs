@@ -221,7 +221,7 @@ impl<'a> Materials<'a> {
                 return Ok(MaterialKind::Mirror { reflectance: Vec3::ONE });
             }
             Some(Value::Constant(color) | Value::Vertices(color)) => {
-                ConductorFresnel::Exact { eta: Vec3::ONE, k: extinction_of_metal(color) }
+                exact(Vec3::ONE, extinction_of_metal(color))
             }
             None => {
                 let index = |name: &str| match entity.find_of(&own(name), &spectra::KINDS)? {
@@ -230,10 +230,7 @@ impl<'a> Materials<'a> {
                         Ok(media::index(&format!("metal-Cu-{name}")).unwrap_or_default().as_vec3())
                     }
                 };
-                ConductorFresnel::Exact {
-                    eta: index("eta")?.max(Vec3::splat(0.01)),
-                    k: index("k")?,
-                }
+                exact(index("eta")?.max(Vec3::splat(0.01)), index("k")?)
             }
         };
         Ok(MaterialKind::Conductor { alpha: roughness.alpha, fresnel })
@@ -246,11 +243,9 @@ impl<'a> Materials<'a> {
             self.textures.log.ignore(features::PBRT_COAT_INDEX, &entity.place);
         }
         let coat_roughness = self.round_roughness(entity, "interface.")?.mean_roughness();
-        let below = |eta: Vec3, k: Vec3| {
-            ConductorFresnel::Exact { eta: eta / ior, k: k / ior }.at_normal_incidence()
-        };
+        let below = |eta: Vec3, k: Vec3| exact(eta / ior, k / ior).at_normal_incidence();
         let (reflectance, alpha) = match self.conductor(entity, "conductor.", surface)? {
-            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
+            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k, .. } } => {
                 (below(eta, k), alpha)
             }
             MaterialKind::Conductor { alpha, .. } => (Vec3::ONE, alpha),
@@ -419,4 +414,8 @@ impl Materials<'_> {
         medium.find("g");
         Ok(is_clear.then_some(absorption))
     }
+}
+
+fn exact(eta: Vec3, k: Vec3) -> ConductorFresnel {
+    ConductorFresnel::Exact { reflectance: Vec3::ONE, eta, k }
 }

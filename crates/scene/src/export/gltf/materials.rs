@@ -114,7 +114,6 @@ impl<'a> Translator<'a> {
                     "its refractive index becomes the reflectance at normal incidence, from which \
                      glTF's metal follows Schlick's approximation",
                 );
-                self.subject.without_color("metal of a refractive index");
                 metal(fresnel.at_normal_incidence(), *alpha)
             }
             &MaterialKind::Principled(own) => {

@@ -112,10 +112,15 @@ impl Translator<'_> {
                 content += &property("boolean", "nonlinear", false);
                 element("roughplastic", &content)
             }
-            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
+            MaterialKind::Conductor {
+                alpha,
+                fresnel: ConductorFresnel::Exact { reflectance, eta, k },
+            } => {
                 self.warn_of_masking(*alpha, "conductor");
-                self.subject.without_color("metal of a refractive index");
-                let content = self.ggx(*alpha) + &rgb("eta", *eta) + &rgb("k", *k);
+                let content = self.ggx(*alpha)
+                    + &self.color("specular_reflectance", *reflectance)
+                    + &rgb("eta", *eta)
+                    + &rgb("k", *k);
                 element("roughconductor", &content)
             }
             MaterialKind::Conductor {

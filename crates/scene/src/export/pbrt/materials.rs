@@ -102,15 +102,16 @@ impl<'a> Translator<'a> {
             MaterialKind::Plastic { diffuse, alpha, ior } => {
                 self.coated(*diffuse, *alpha, *ior, "its coat and base")
             }
-            MaterialKind::Conductor { alpha, fresnel: ConductorFresnel::Exact { eta, k } } => {
-                self.without_color("metal of a refractive index");
+            MaterialKind::Conductor {
+                alpha,
+                fresnel: ConductorFresnel::Exact { reflectance: Vec3::ONE, eta, k },
+            } if self.subject.surface.color.is_none() => {
                 let index = rgb("eta", *eta) + &rgb("k", *k);
                 ("conductor", index + &self.roughness(*alpha))
             }
-            MaterialKind::Conductor {
-                alpha,
-                fresnel: ConductorFresnel::Schlick { reflectance },
-            } => self.metal(*reflectance, *alpha),
+            MaterialKind::Conductor { alpha, fresnel } => {
+                self.metal(fresnel.at_normal_incidence(), *alpha)
+            }
             MaterialKind::Principled(own) => {
                 self.subject.without_cover(own);
                 let (share, _) = self.subject.mean_metal_and_roughness();
@@ -168,17 +169,13 @@ impl<'a> Translator<'a> {
 
     /// Names colours that glass has no place for.
     fn colored_glass(&mut self, reflectance: Vec3, transmittance: Vec3) {
-        self.without_color("dielectric");
+        if self.subject.surface.color.is_some() {
+            self.subject.warn("the colours of its surface have no place in a dielectric");
+        }
         if reflectance != Vec3::ONE || transmittance != Vec3::ONE {
             self.subject.warn(
                 "the factors of reflected and transmitted light have no place in pbrt's glass",
             );
-        }
-    }
-
-    fn without_color(&mut self, kind: &str) {
-        if self.subject.surface.color.is_some() {
-            self.subject.warn(&format!("the colours of its surface have no place in a {kind}"));
         }
     }
 
