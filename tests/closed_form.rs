@@ -235,6 +235,12 @@ fn an_edge_has_the_blur_of_filter_and_lens() {
     let sums = render(&scene, Settings { shadow_rays: 0, ..Settings::default() }, 64);
     let dark = (0..sums.pixel_count()).filter(|pixel| sums.mean(*pixel)[0] < 0.75);
     assert_eq!(dark.collect::<Vec<_>>(), (6 * 21..7 * 21).collect::<Vec<_>>());
+    // The mirror image is bright to the left of the border.
+    let camera = &mut scene.camera;
+    (camera.up, camera.shift, camera.mirrored) = (Vec3::Y, [3.0 / 7.0, 0.0], true);
+    let sums = render(&scene, Settings { shadow_rays: 0, ..Settings::default() }, 64);
+    let bright = (0..21).filter(|column| sums.mean(3 * 21 + column)[0] > 0.75);
+    assert_eq!(bright.collect::<Vec<_>>(), (0..7).collect::<Vec<_>>());
 }
 
 #[test]

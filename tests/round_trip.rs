@@ -338,8 +338,8 @@ fn environments_and_lenses_come_back() {
     let _alone = support::alone();
     let sky = "[environment]\nsky = { width = 64, sun_radius_deg = 20.0, \
                sun_radiance = [20, 15, 10] }\nrotation_deg = 30.0\n";
-    let lens =
-        "vertical_fov_deg = 40.0\naperture_radius = 0.1\nfocus_distance = 3.0\nshift = [0.3, -0.1]";
+    let lens = "vertical_fov_deg = 40.0\naperture_radius = 0.1\nfocus_distance = 3.0\n\
+                shift = [0.3, -0.1]\nmirrored = true";
     let view = VIEW.replace("vertical_fov_deg = 40.0", lens);
     let chrome = "type = \"conductor\"\nalpha = 0.3\neta = [0.2, 0.9, 1.1]\nk = [3.9, 2.5, 2.3]";
     let scene = [&view, sky, &floor("[0.6, 0.5, 0.3]"), &ball("chrome", 0.0, chrome)].concat();
@@ -351,6 +351,7 @@ fn environments_and_lenses_come_back() {
     let expected = [
         "camera: glTF has no lens",
         "camera: glTF shifts no lens",
+        "camera: glTF mirrors",
         "--rotate-environment 30",
         "refractive index",
     ];

@@ -123,6 +123,7 @@ mod tests {
             aperture_radius: 0.0,
             focus_distance: 4.0,
             shift: [0.0; 2],
+            mirrored: false,
         })
     }
 

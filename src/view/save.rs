@@ -26,6 +26,9 @@ pub(super) fn camera_toml(camera: &Camera) -> String {
     if camera.shift != [0.0; 2] {
         let _ = writeln!(text, "shift = {:?}", camera.shift);
     }
+    if camera.mirrored {
+        text += "mirrored = true\n";
+    }
     if camera.aperture_radius > 0.0 {
         let (radius, distance) = (camera.aperture_radius, camera.focus_distance);
         let _ = write!(text, "aperture_radius = {radius:?}\nfocus_distance = {distance:?}\n");

@@ -43,6 +43,7 @@ fn camera(position: Vec3, look_at: Vec3) -> Camera {
         aperture_radius: 0.0,
         focus_distance: 1.0,
         shift: [0.0; 2],
+        mirrored: false,
     }
 }
 

@@ -178,7 +178,6 @@ features! {
     MI_SPOT_TEXTURE "`texture` of a `spot`" "its mean over the whole cone";
     MI_EMITTER "other emitters, by name" "left out";
     MI_SENSORS "sensors that are not used" "";
-    MI_MIRRORED "mirror image of the sensor's `to_world`" "the picture is not mirrored";
     MI_FILTER "other `rfilter`s" "`gaussian` of ½";
     MI_INTEGRATOR "integrators of other pictures than those of paths, by name" "";
     MI_HIDE_EMITTERS "`hide_emitters`" "lights are seen";

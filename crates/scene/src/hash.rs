@@ -25,6 +25,9 @@ pub(crate) fn hash(scene: &Scene) -> String {
         if camera.shift != [0.0; 2] {
             hasher.array(&[camera.shift]);
         }
+        if camera.mirrored {
+            hasher.length(1);
+        }
         hasher.still(scene);
     })
 }

@@ -150,6 +150,8 @@ pub struct Camera {
     /// Place of the image's centre right of and above `look_at`, in heights of the image: a shifted lens,
     /// which keeps lines parallel that run along the film.
     pub shift: [f32; 2],
+    /// True if the picture is the mirror image of what the camera sees, left for right.
+    pub mirrored: bool,
 }
 
 /// Most portals of a scene: every shadow ray goes through all of them.

@@ -1059,6 +1059,7 @@ fn the_hash_follows_the_picture_and_not_the_text() {
         ("= 40", "= 40\naperture_radius = 0.1\nfocus_distance = 5"),
         ("= 40", "= 40\nfocus_distance = 4"),
         ("= 40", "= 40\nshift = [0, 0.1]"),
+        ("= 40", "= 40\nmirrored = true"),
         ("constant = [1, 1, 1]", "constant = [1, 1, 1.001]"),
         ("0.5, 0.5, 0.5", "0.5, 0.5, 0.501"),
         ("type = \"diffuse\"\nreflectance", "type = \"conductor\"\nalpha = 0.5\nreflectance"),

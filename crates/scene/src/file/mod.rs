@@ -67,6 +67,9 @@ pub(crate) struct CameraEntry {
     /// Place of the image's centre right of and above `look_at`, in heights of the image.
     #[serde(default)]
     pub shift: [f32; 2],
+    /// Shows the mirror image, left for right.
+    #[serde(default)]
+    pub mirrored: bool,
 }
 
 /// One `[[camera.keyframe]]`; what it leaves out is that of `[camera]`.

@@ -310,6 +310,7 @@ impl<'a> Loader<'a> {
             aperture_radius: entry.aperture_radius,
             focus_distance,
             shift: entry.shift,
+            mirrored: entry.mirrored,
         })
     }
 
@@ -353,7 +354,7 @@ impl<'a> Loader<'a> {
                 .iter()
                 .any(|camera| camera.focus_distance.is_some())
                 .then(|| number(&focus_distance)),
-            shift: file.camera.shift,
+            ..file.camera.clone()
         })
     }
 }
@@ -366,7 +367,7 @@ fn completed(frame: &KeyframeEntry, camera: &CameraEntry) -> CameraEntry {
         vertical_fov_deg: frame.vertical_fov_deg.unwrap_or(camera.vertical_fov_deg),
         aperture_radius: frame.aperture_radius.unwrap_or(camera.aperture_radius),
         focus_distance: frame.focus_distance.or(camera.focus_distance),
-        shift: camera.shift,
+        ..camera.clone()
     }
 }
 

@@ -238,6 +238,7 @@ fn pinhole(position: Vec3, look_at: Vec3, up: Vec3, vertical_fov_deg: f32) -> Ca
         aperture_radius: 0.0,
         focus_distance: None,
         shift: [0.0; 2],
+        mirrored: false,
     }
 }
 

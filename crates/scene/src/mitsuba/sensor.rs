@@ -123,10 +123,6 @@ impl Reader {
         if forward.cross(up).length() < 1e-4 || matrix.determinant() == 0.0 {
             return Err(node.error(NO_INVERSE));
         }
-        // The axes of the camera are +X to the left, +Y up, +Z along the view.
-        if matrix.determinant() < 0.0 {
-            self.ignored.add(features::MI_MIRRORED, || node.place());
-        }
         let offset = |name: &str| Ok(f64::from(parameters.float(name)?.unwrap_or(0.0)));
         let offset =
             DVec2::new(offset("principal_point_offset_x")?, offset("principal_point_offset_y")?);
@@ -164,6 +160,8 @@ impl Reader {
             aperture_radius,
             focus_distance: Some(focus_distance),
             shift: shift.as_vec2().to_array(),
+            // The axes of the camera are +X to the left, +Y up, +Z along the view.
+            mirrored: matrix.determinant() < 0.0,
         })
     }
 

@@ -62,6 +62,7 @@ pub(super) fn view(description: &Description, log: &mut Log) -> Result<View> {
         aperture_radius: aperture_radius as f32,
         focus_distance: Some(focus_distance as f32),
         shift: shift.map(|share| share as f32),
+        mirrored: false,
     };
     log.unused(entity);
     Ok(View { camera: Some(camera), film, exposure, mirror })

@@ -147,6 +147,9 @@ fn camera_nodes(
         warnings
             .push("camera: glTF shifts no lens; the view axis meets the image's centre".to_owned());
     }
+    if camera.mirrored {
+        warnings.push("camera: glTF mirrors no picture".to_owned());
+    }
     if film.filter == Filter::Box {
         warnings.push("film: glTF has no filter; readers do not take the box".to_owned());
     }

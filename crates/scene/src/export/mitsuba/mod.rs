@@ -109,7 +109,8 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
 /// Camera, sampler and film. Mitsuba leaves out surfaces nearer or farther than its clip planes.
 fn sensor(scene: &Scene, parts: &[Parts], samples: u32) -> String {
     let Camera { position, look_at, up, .. } = scene.camera;
-    let Camera { vertical_fov_deg, aperture_radius, focus_distance, shift, .. } = scene.camera;
+    let Camera { vertical_fov_deg, aperture_radius, focus_distance, shift, mirrored, .. } =
+        scene.camera;
     // The farthest corner of the box is at least as far as all vertices.
     let corner = parts::bounds(parts)
         .map_or(0.0, |[low, high]| (low - position).abs().max((high - position).abs()).length());
@@ -137,10 +138,11 @@ fn sensor(scene: &Scene, parts: &[Parts], samples: u32) -> String {
         }
     };
     let [origin, target, up] = [position, look_at, up].map(triple);
+    let mirror = if mirrored { "<scale x=\"-1\"/>" } else { "" };
     _ = write!(
         xml,
         r#"        <string name="fov_axis" value="y"/>
-        <transform name="to_world">
+        <transform name="to_world">{mirror}
             <lookat origin="{origin}" target="{target}" up="{up}"/>
         </transform>
         <sampler type="independent">

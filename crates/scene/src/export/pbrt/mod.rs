@@ -95,14 +95,17 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
 /// mirror makes it one of a right-handed world. `fov` is that of the shorter side.
 fn view(scene: &Scene, settings: Settings, name: &str) -> String {
     let Camera { position, look_at, up, .. } = scene.camera;
-    let Camera { vertical_fov_deg, aperture_radius, focus_distance, shift, .. } = scene.camera;
+    let Camera { vertical_fov_deg, aperture_radius, focus_distance, shift, mirrored, .. } =
+        scene.camera;
     let FilmSettings { width, height, filter } = scene.film;
     let aspect = f64::from(width) / f64::from(height);
     let tangent = (0.5 * f64::from(vertical_fov_deg)).to_radians().tan();
     let fov = 2.0 * (tangent * aspect.min(1.0)).atan().to_degrees();
     let [eye, target, up] = [position, look_at, up].map(triple);
+    let side = if mirrored { 1 } else { -1 };
     let mut text = format!(
-        "Scale -1 1 1\nLookAt {eye}\n       {target}\n       {up}\nCamera \"perspective\" \"float fov\" {fov}"
+        "Scale {side} 1 1\nLookAt {eye}\n       {target}\n       {up}\nCamera \"perspective\" \
+         \"float fov\" {fov}"
     );
     if aperture_radius > 0.0 {
         _ = write!(
