@@ -242,10 +242,7 @@ fn parameters(
 
 /// Replaces the camera.
 fn with_camera(parameters: SceneParameters, camera: &Camera) -> SceneParameters {
-    let forward = (camera.look_at - camera.position).normalize_or(Vec3::NEG_Z);
-    let right = forward.cross(camera.up).normalize_or(Vec3::X);
-    let up = right.cross(forward);
-    let right = if camera.mirrored { -right } else { right };
+    let [right, up, forward] = camera.axes();
     SceneParameters {
         camera_position: camera.position.into(),
         camera_aperture_radius: camera.aperture_radius,

@@ -47,7 +47,7 @@ impl Rig {
 
     /// Focuses on a point, metres.
     pub(crate) fn focus(&mut self, point: Vec3) {
-        let [_, _, forward] = self.axes();
+        let [_, _, forward] = self.camera.axes();
         self.camera.focus_distance = (point - self.camera.position).dot(forward).max(1e-3);
     }
 
@@ -70,6 +70,7 @@ impl Rig {
     /// Turns `offset` about the vertical, then toward it, but not to the poles.
     fn turned(&self, offset: Vec3, about: f32, toward: f32) -> Vec3 {
         let vertical = self.camera.up.normalize_or(Vec3::Y);
+        let about = if self.camera.mirrored { -about } else { about };
         let offset = Quat::from_axis_angle(vertical, about) * offset;
         let angle = offset.angle_between(vertical);
         let wanted = (angle - toward).clamp(POLE, std::f32::consts::PI - POLE);
@@ -81,7 +82,7 @@ impl Rig {
     pub(crate) fn pan(&mut self, right: f32, up: f32) {
         let distance = (self.camera.look_at - self.camera.position).length();
         let height = 2.0 * distance * (0.5 * self.camera.vertical_fov_deg).to_radians().tan();
-        let [axis_right, axis_up, _] = self.axes();
+        let [axis_right, axis_up, _] = self.camera.axes();
         self.shift(height * (right * axis_right + up * axis_up));
     }
 
@@ -93,7 +94,7 @@ impl Rig {
 
     /// Flies to the right, up and forward, each −1 to 1, for some seconds.
     pub(crate) fn fly(&mut self, direction: Vec3, seconds: f32) {
-        let [right, up, forward] = self.axes();
+        let [right, up, forward] = self.camera.axes();
         let way = direction.x * right + direction.y * up + direction.z * forward;
         self.shift(way * (seconds * PACE * self.speed * self.reach));
     }
@@ -101,12 +102,6 @@ impl Rig {
     fn shift(&mut self, way: Vec3) {
         self.camera.position += way;
         self.camera.look_at += way;
-    }
-
-    fn axes(&self) -> [Vec3; 3] {
-        let forward = (self.camera.look_at - self.camera.position).normalize_or(Vec3::NEG_Z);
-        let right = forward.cross(self.camera.up).normalize_or(Vec3::X);
-        [right, right.cross(forward), forward]
     }
 }
 
@@ -144,6 +139,14 @@ mod tests {
         let mut moved = rig();
         moved.turn(quarter, 0.0);
         assert_near(moved.camera.look_at, [4.0, 1.0, 4.0]);
+        let mut mirrored = rig();
+        mirrored.camera.mirrored = true;
+        mirrored.turn(quarter, 0.0);
+        assert_near(mirrored.camera.look_at, [-4.0, 1.0, 4.0]);
+        mirrored.go_home();
+        mirrored.camera.mirrored = true;
+        mirrored.fly(Vec3::X, 1.0);
+        assert_near(mirrored.camera.position, [-4.0 * PACE, 1.0, 4.0]);
         let mut moved = rig();
         moved.pan(0.5, 0.25);
         assert_near(moved.camera.position, [4.0, 3.0, 4.0]);

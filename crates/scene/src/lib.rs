@@ -154,6 +154,15 @@ pub struct Camera {
     pub mirrored: bool,
 }
 
+impl Camera {
+    /// Unit vectors to the right of the image, up in it and along the view.
+    pub fn axes(&self) -> [Vec3; 3] {
+        let forward = (self.look_at - self.position).normalize_or(Vec3::NEG_Z);
+        let right = forward.cross(self.up).normalize_or(Vec3::X);
+        [if self.mirrored { -right } else { right }, right.cross(forward), forward]
+    }
+}
+
 /// Most portals of a scene: every shadow ray goes through all of them.
 pub(crate) const MAX_PORTALS: usize = 256;
 

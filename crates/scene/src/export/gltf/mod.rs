@@ -153,10 +153,8 @@ fn camera_nodes(
     if film.filter == Filter::Box {
         warnings.push("film: glTF has no filter; readers do not take the box".to_owned());
     }
-    let forward = (camera.look_at - camera.position).normalize_or(Vec3::NEG_Z);
-    let right = forward.cross(camera.up).try_normalize();
-    let right = right.unwrap_or_else(|| forward.any_orthonormal_vector());
-    let axes = [right, right.cross(forward), -forward].map(|axis| axis.extend(0.0));
+    let [_, up, forward] = camera.axes();
+    let axes = [forward.cross(up), up, -forward].map(|axis| axis.extend(0.0));
     let matrix = Mat4::from_cols(axes[0], axes[1], axes[2], camera.position.extend(1.0));
     let lens = json!({"type": "perspective", "name": "camera", "perspective": {
         "yfov": camera.vertical_fov_deg.to_radians(),
