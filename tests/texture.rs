@@ -627,9 +627,15 @@ fn textures_of_one_value_are_factors() {
         material.surface.roughness = used([0.5; 3]);
         material.surface.metallic = used([0.25; 3]);
     }
-    for strength in [0.0, 0.4] {
+    // The last time below a sheen.
+    for (strength, sheen) in [(0.0, 0.0), (0.4, 0.0), (0.0, 0.5)] {
         if strength > 0.0 {
             (plain[1].kind, textured[1].kind) = (copper(0.2, half), copper(0.8, full));
+        }
+        for material in [&mut plain[2], &mut textured[2]] {
+            if let MaterialKind::Principled(own) = &mut material.kind {
+                own.sheen_color = Vec3::splat(sheen);
+            }
         }
         let of = |strength, direction| Anisotropy { strength, rotation: 0.7, direction };
         plain[2].surface.anisotropy = of(strength, None);
