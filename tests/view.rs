@@ -4,7 +4,21 @@
 
 use std::{fmt::Write, process::Command};
 
-use fenestra::{film::Image, view::keys};
+use bytemuck::Pod;
+use fenestra::{
+    film::Image,
+    gpu::{Buffer, Commands, DescriptorSet, Pipeline},
+    shader::{
+        bindings::{Binding, BindingTable, FILM, VIEW, film, view},
+        constants::{
+            CURVE_CLIP, SHOW_ALBEDO, SHOW_CELLS, SHOW_ERROR, SHOW_LEVELS, SHOW_NORMAL,
+            SHOW_PICTURE, SHOW_VISIBLE,
+        },
+        spirv,
+        structs::{ShownFilm, WindowFrame},
+    },
+    view::keys,
+};
 
 use crate::support::{
     self,
@@ -292,6 +306,176 @@ fn controls_change_what_they_say() {
     view.wait_until(|view| at(view, [100, 470]) != Some(PANEL));
     view.tap("Escape");
     view.end().assert(0, &[]);
+}
+
+/// Makes a descriptor set of buffers that hold these bytes.
+fn set_of(table: &'static BindingTable, content: &[(Binding, &[u8])]) -> DescriptorSet {
+    let buffer = |(binding, bytes): &(Binding, &[u8])| {
+        (*binding, Buffer::from_slice(support::device(), binding.name, bytes).unwrap())
+    };
+    let buffers: Vec<_> = content.iter().map(buffer).collect();
+    DescriptorSet::new(support::device(), table, &buffers).unwrap()
+}
+
+/// Runs a pass of the window.
+fn project(shader: &str, sets: &[&DescriptorSet], constants: &impl Pod, invocations: u32) {
+    let pipeline = Pipeline::new(support::device(), shader, spirv::pass(shader), &[]).unwrap();
+    let mut commands = Commands::begin(support::device()).unwrap();
+    commands.dispatch(&pipeline, sets, bytemuck::bytes_of(constants), invocations);
+    commands.submit_and_wait().unwrap();
+    support::assert_silent();
+}
+
+/// Five samples of a page of two pixels that begins at the second one of the film. The errors of both are
+/// 10%, in the middle of the colours: 0.3 of a mean of 3, and 0.5 of 3 where a tenth of the film's is 4.
+#[test]
+fn layers_are_shown_as_means() {
+    let _alone = support::alone();
+    let squares = [0.3_f32, 0.5].map(|error| [45.0 + 20.0 * error * error; 3]);
+    let colours = |first: f32| [[first, 5.0, 0.0], [first + 1.0, 0.0, 2.5]];
+    let film = set_of(
+        &FILM,
+        &[
+            (film::FILM_SUM, bytemuck::bytes_of(&[[14.0_f32; 3]; 2])),
+            (film::FILM_COMPENSATION, bytemuck::bytes_of(&[[1.0_f32; 3]; 2])),
+            (film::FILM_SQUARES, bytemuck::bytes_of(&squares)),
+            (film::FILM_ALBEDO, bytemuck::bytes_of(&colours(0.5))),
+            (film::FILM_NORMAL, bytemuck::bytes_of(&colours(-5.0))),
+            (film::FILM_VISIBLE, bytemuck::bytes_of(&[[3_u32, 4], [0, 0]])),
+            (film::FILM_GUIDE_CELL, bytemuck::bytes_of(&colours(1.5))),
+            (film::FILM_GUIDE_LEVEL, bytemuck::bytes_of(&colours(2.5))),
+        ],
+    );
+    let shown = |layer, sample_count, mean_radiance| -> [[f32; 3]; 2] {
+        let shown = set_of(&VIEW, &[(view::SHOWN, bytemuck::bytes_of(&[[-1.0_f32; 3]; 4]))]);
+        let constants = ShownFilm {
+            first_pixel: 1,
+            first_place: 0,
+            end_place: 2,
+            sample_count,
+            layer,
+            mean_radiance,
+        };
+        project("show", &[&film, &shown], &constants, 3);
+        let [before, first, second, after] =
+            shown.buffer(view::SHOWN).download(4).unwrap().try_into().unwrap();
+        assert_eq!([before, after], [[-1.0; 3]; 2], "pixels of other pages");
+        [first, second]
+    };
+    let close = |name: &str, found: [f32; 3], expected: [f32; 3]| {
+        let is_close = found.iter().zip(expected).all(|(one, other)| (one - other).abs() < 1e-4);
+        assert!(is_close, "{name}: {found:?}, not {expected:?}");
+    };
+    for (name, layer, expected) in [
+        ("picture", SHOW_PICTURE, [[3.0; 3]; 2]),
+        ("albedo", SHOW_ALBEDO, [[0.1, 1.0, 0.0], [0.3, 0.0, 0.5]]),
+        ("normal", SHOW_NORMAL, [[0.0, 1.0, 0.5], [0.1, 0.5, 0.75]]),
+        ("visible", SHOW_VISIBLE, [[0.75; 3], [0.0; 3]]),
+        ("cells", SHOW_CELLS, [[0.3, 1.0, 0.0], [0.5, 0.0, 0.5]]),
+        ("levels", SHOW_LEVELS, [[0.5, 1.0, 0.0], [0.7, 0.0, 0.5]]),
+    ] {
+        let found = shown(layer, 5, 0.0);
+        (0..2).for_each(|pixel| close(name, found[pixel], expected[pixel]));
+    }
+    // Values of the map "turbo".
+    let (middle, last) = ([0.31151, 0.96054, 0.07775], [0.28573, 0.00140, 0.0]);
+    close("10%", shown(SHOW_ERROR, 5, 0.0)[0], middle);
+    close("10% of what the film has", shown(SHOW_ERROR, 5, 40.0)[1], middle);
+    close("one sample", shown(SHOW_ERROR, 1, 0.0)[0], last);
+}
+
+/// Films side by side, each at its size, between what lies around them, an inset and the controls; then a
+/// film of two pixels that stands in for a larger one.
+#[test]
+fn films_inset_and_controls_have_their_places() {
+    let _alone = support::alone();
+    // Levels of linear values.
+    let grey = |level: u8| {
+        let share = f32::from(level) / 255.0;
+        let value =
+            if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) };
+        [value; 3]
+    };
+    let left = [10, 20, 30, 40].map(grey);
+    let right = [50, 60, 70, 80, 90, 100, 110, 120].map(grey);
+    let inset = [0xff03_0201_u32, 0xff06_0504];
+    // Opaque, and half of what lies below.
+    let overlay = [0xff09_0807_u32, 0x8000_0000];
+    let composed = |frame: WindowFrame| -> Vec<[u8; 4]> {
+        let pixels = vec![0_u8; 4 * (frame.width * frame.height) as usize];
+        let set = set_of(
+            &VIEW,
+            &[
+                (view::SHOWN, bytemuck::bytes_of(&left)),
+                (view::SHOWN_RIGHT, bytemuck::bytes_of(&right)),
+                (view::INSET, bytemuck::bytes_of(&inset)),
+                (view::OVERLAY, bytemuck::bytes_of(&overlay)),
+                (view::WINDOW_PIXELS, &pixels),
+            ],
+        );
+        project("compose", &[&set], &frame, frame.width * frame.height);
+        set.buffer(view::WINDOW_PIXELS).download(pixels.len() / 4).unwrap()
+    };
+    // Bytes are alpha last, and grey but for the inset and the controls.
+    let greys = |pixels: &[[u8; 4]]| pixels.iter().map(|pixel| pixel[1]).collect::<Vec<_>>();
+    let frame = WindowFrame {
+        width: 6,
+        height: 4,
+        left: 1,
+        top: 1,
+        shown_width: 4,
+        shown_height: 2,
+        film_width: 2,
+        film_height: 2,
+        right_width: 4,
+        right_height: 2,
+        is_reduced: 0,
+        split: 2,
+        first_index: 0,
+        exposure: 1.0,
+        curve: CURVE_CLIP,
+        is_bgra: 0,
+        inset_width: 2,
+        inset_height: 1,
+        overlay_width: 2,
+        overlay_height: 1,
+    };
+    let pixels = composed(frame);
+    #[rustfmt::skip]
+    let expected = [
+        8, 17, 33, 33, 33, 33,
+        33, 10, 255, 70, 80, 33,
+        33, 30, 255, 2, 5, 33,
+        33, 33, 33, 33, 33, 33,
+    ];
+    let found = greys(&pixels);
+    let is_close = found.iter().zip(expected).all(|(one, other)| one.abs_diff(other) <= 1);
+    assert!(is_close, "{found:?}, not {expected:?}");
+    assert_eq!(
+        [pixels[0], pixels[15], pixels[16]],
+        [[7, 8, 9, 255], [1, 2, 3, 255], [4, 5, 6, 255]]
+    );
+    let blue_first = composed(WindowFrame { is_bgra: 1, ..frame });
+    assert_eq!([blue_first[0], blue_first[15]], [[9, 8, 7, 255], [3, 2, 1, 255]]);
+    // Display values between 10 and 20, from the middle of one pixel to that of the next.
+    let found = composed(WindowFrame {
+        width: 8,
+        height: 1,
+        left: 0,
+        top: 0,
+        shown_width: 8,
+        shown_height: 1,
+        film_height: 1,
+        is_reduced: 1,
+        split: 8,
+        inset_width: 0,
+        overlay_width: 0,
+        ..frame
+    });
+    let found = greys(&found);
+    let expected = [10, 10, 11, 14, 16, 19, 20, 20];
+    let is_close = found.iter().zip(expected).all(|(one, other)| one.abs_diff(other) <= 1);
+    assert!(is_close, "{found:?}, not {expected:?}");
 }
 
 #[test]
