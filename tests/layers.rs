@@ -184,6 +184,26 @@ fn mattes_are_the_shares_of_objects_and_materials() {
     }
 }
 
+/// Eight stripes in one pixel, of which six find room: none is counted as another.
+#[test]
+fn mattes_without_room_are_not_counted() {
+    let _alone = support::alone();
+    let mut scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
+    (scene.film.width, scene.film.height) = (1, 1);
+    scene.camera.position = Vec3::new(0.0, 9.0, 1e-3);
+    scene.camera.vertical_fov_deg = 2.0 * (4.0_f32 / 9.0).atan().to_degrees();
+    scene.geometry = Geometry::default();
+    for stripe in 0..8 {
+        scene.geometry.start_object(&format!("stripe {stripe}"));
+        let centre = Vec3::new(stripe as f32 - 3.5, -0.5, 0.0);
+        scenes::add_box(&mut scene.geometry, centre, Vec3::new(1.0, 1.0, 99.0), 0);
+    }
+    let aovs = vec![Aov::CryptoObject];
+    let settings = Settings { depth: 1, shadow_rays: 1, aovs, ..Settings::default() };
+    let counts = render(&scene, settings, 256).0.objects[0].map(|[_, count]| count);
+    assert!(counts.iter().all(|count| (24..=40).contains(count)), "{counts:?} of 256");
+}
+
 #[test]
 fn cache_entries_are_those_of_the_statistics() {
     let _alone = support::alone();
