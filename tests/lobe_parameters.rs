@@ -127,6 +127,24 @@ fn where_everything_is_blocked_all_rays_but_the_last_are_learned_from() {
     }
 }
 
+/// The share of the product that its lobes keep grows with their number, up to all of it.
+#[test]
+fn more_lobes_keep_more_of_the_product() {
+    let _alone = support::alone();
+    let kept = [2, 8, 32, 320].map(|lobes| {
+        let settings = settings(Sampler::Product, &[&format!("lobes={lobes}")]);
+        let (_, totals) = render(&closed_box(), settings, 1);
+        let statistics = totals.sampler_statistics();
+        // Lobes of the sky below the horizon have no product.
+        let most = if lobes == 320 { 319.0 } else { f64::from(lobes) };
+        assert!(statistics["lobes_per_hit"] <= most, "{statistics:?}");
+        statistics["energy_kept"]
+    });
+    eprintln!("{kept:.3?}");
+    assert!(kept[0] < 0.2 && kept[3] > 0.8, "{kept:?}");
+    assert!(kept.is_sorted_by(|one, other| *one + 0.01 < *other), "{kept:?}");
+}
+
 #[test]
 fn where_nothing_is_blocked_nothing_is_learned() {
     let _alone = support::alone();
