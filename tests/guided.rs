@@ -8,6 +8,7 @@
 use std::collections::BTreeSet;
 
 use fenestra::{
+    film::Aov,
     pass::Roulette,
     sampler::{
         Parameters, Sampler,
@@ -277,6 +278,23 @@ fn late_samples_teach_by_one_in_four() {
     assert_eq!(pending_rays(&other), four_more);
     assert!(other.sums().unwrap() == renderer.sums().unwrap());
     support::assert_silent();
+}
+
+/// A sample of a wave shows the cell that it found itself: as near as this, many pixels have cells of two
+/// sizes.
+#[test]
+fn samples_of_a_wave_show_their_own_cells() {
+    let _alone = support::alone();
+    let mut scene = scenes::mixed_room();
+    scene.camera.vertical_fov_deg = 2.0;
+    let settings = Settings { aovs: vec![Aov::GuideCell], ..guided(1) };
+    // The last rebuild comes after 64 samples.
+    let together = support::render_passes(&scene, settings.clone(), &[64, 12]);
+    let apart = support::render_passes(&scene, settings, &[&[64][..], &[1; 12]].concat());
+    assert!(together == apart);
+    let is_mixed =
+        |sum: &[f32; 3]| sum.iter().any(|sum| !((256.0 * sum) as u32).is_multiple_of(76));
+    assert!(together.guide_cell.iter().any(is_mixed), "every pixel shows one cell");
 }
 
 /// With few regions a short render refines cells, and their parts are found. The mode "few regions"
