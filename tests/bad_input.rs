@@ -603,6 +603,16 @@ fn rays_that_are_given_up_are_counted_with_their_pixels() {
     };
     // Pixels count from the corner of the film.
     assert_eq!(bounds(&[]), bounds(&["--crop", "3,3,16,12"]));
+    // A crowd in front of every pixel, and a filter that asks for none around the window.
+    let crowd = ["-9 -9 0.5", "9 -9 0.5", "0 9 0.5"];
+    folder.write("quad.ply", ply(&[&QUAD_VERTICES[..], &crowd].concat(), &faces));
+    folder.write("scene.toml", SCENE.replace("height = 12", "height = 12\nfilter = \"box\""));
+    for window in ["0,0,16,12", "3,4,11,9"] {
+        let more =
+            ["--tracer", "device", "--sampler", "mis", "--shadow-rays", "1", "--crop", window];
+        let run = folder.run(&[&RENDER[..], &more].concat());
+        run.assert(0, &[&format!("pixels within --crop {window} may be wrong")]);
+    }
 }
 
 /// A gigabyte of zeros as the colour profile of a PNG image, under a limit of 700 MB: each thread takes some.
