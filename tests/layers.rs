@@ -222,6 +222,16 @@ fn cache_entries_are_those_of_the_statistics() {
 }
 
 #[test]
+fn visible_rays_are_those_of_the_statistics() {
+    let _alone = support::alone();
+    let settings = Settings { depth: 2, aovs: vec![Aov::Visible], ..Settings::default() };
+    let (sums, totals) = render(&room(), settings, 3);
+    let [visible, traced] = total(&sums.visible);
+    assert_eq!([visible, traced], [totals.shadow_rays_visible, totals.shadow_rays_traced]);
+    assert!(0 < visible && visible < traced, "{visible} of {traced}");
+}
+
+#[test]
 fn where_nothing_is_blocked_caches_are_empty() {
     let _alone = support::alone();
     let scene = scenes::plane(Vec3::splat(0.5), scenes::sky());
