@@ -605,10 +605,14 @@ fn textures_of_one_value_are_factors() {
     };
     let (full, half) = (vec3(0.8, 0.6, 0.4), vec3(0.4, 0.15, 1.0));
     let of = |kind| Material::new("m", kind);
+    // Coloured texels count by their luminance.
+    let (texel, dark) = ([0.75, 0.375, 1.0], [0.375, 0.1875, 0.5]);
+    let [share, metallic] = [texel, dark].map(|texel| luminance(texel.into()));
+    let alpha = 0.8 * share * share;
     let mut plain = vec![
         of(MaterialKind::Diffuse { reflectance: half }),
-        of(metal(0.2, half)),
-        of(materials::principled(half, 0.2, 0.25)),
+        of(metal(alpha, half)),
+        of(materials::principled(half, 0.8 * metallic, 0.5 * share)),
     ];
     let used = |value: [f32; 3]| {
         let [r, g, b] = value.map(f16::from_f32);
@@ -623,14 +627,16 @@ fn textures_of_one_value_are_factors() {
         of(materials::principled(full, 0.8, 0.5)),
     ];
     for material in &mut textured {
-        material.surface.color = used([0.5, 0.25, 4.0]);
-        material.surface.roughness = used([0.5; 3]);
-        material.surface.metallic = used([0.25; 3]);
+        // Half of the red is in the colours of vertices.
+        material.surface.color = used([1.0, 0.25, 4.0]);
+        material.surface.vertex_color = true;
+        material.surface.roughness = used(texel);
+        material.surface.metallic = used(dark);
     }
     // The last time below a sheen.
     for (strength, sheen) in [(0.0, 0.0), (0.4, 0.0), (0.0, 0.5)] {
         if strength > 0.0 {
-            (plain[1].kind, textured[1].kind) = (copper(0.2, half), copper(0.8, full));
+            (plain[1].kind, textured[1].kind) = (copper(alpha, half), copper(0.8, full));
         }
         for material in [&mut plain[2], &mut textured[2]] {
             if let MaterialKind::Principled(own) = &mut material.kind {
@@ -643,6 +649,7 @@ fn textures_of_one_value_are_factors() {
         let [plain, textured] = [&plain, &textured].map(|materials| {
             let mut scene = scenes::room(materials.clone());
             scene.geometry.uvs[0] = vec![[0.3, 0.7]; scene.geometry.positions.len()];
+            scene.geometry.colors = vec![[0.5, 1.0, 1.0, 1.0]; scene.geometry.positions.len()];
             let mut settings = Settings { depth: 3, ..Settings::default() };
             settings.parameters.set("share-paths=8").unwrap();
             support::render(&scene, settings, 2).0.sum
