@@ -88,7 +88,8 @@ fn stretched_highlights_lie_where_the_tangent_says() {
         ("v along z", mirrored, eighth, None, None, 1.0 - inside),
         ("texel up", straight, -eighth, texture([0.5, 1.0, 1.0]), None, inside),
         ("texel askew", straight, 0.0, texture([0.25, 0.25, 1.0]), None, inside),
-        ("a flat normal map", straight, eighth, None, flat, inside),
+        ("a flat normal map", straight, eighth, None, flat.clone(), inside),
+        ("both", straight, 0.0, texture([0.25, 0.25, 1.0]), flat, inside),
         ("no strength", straight, eighth, texture([1.0, 0.5, 0.0]), None, 0.5),
     ] {
         scene.geometry.uvs[0] = uvs.to_vec();
