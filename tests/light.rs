@@ -569,4 +569,11 @@ fn the_back_of_a_one_sided_surface_is_black() {
     scene.materials[0].surface.two_sided = true;
     let lit = mean(&scene, settings(Sampler::Mis, 2));
     assert!(lit > 0.1, "{lit}");
+    // It keeps both sides beside one that has not, outside.
+    let mut other = scenes::diffuse(Vec3::ONE);
+    other.surface.two_sided = false;
+    scene.materials.push(other);
+    scenes::add_box(&mut scene.geometry, Vec3::new(0.8, 0.0, 0.0), Vec3::splat(0.1), 1);
+    let beside = mean(&scene, settings(Sampler::Mis, 2));
+    assert!((beside - lit).abs() < 1e-3 * lit, "{beside}, not {lit}");
 }
