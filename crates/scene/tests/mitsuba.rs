@@ -1038,13 +1038,20 @@ fn sides_are_those_of_mitsuba() {
         let emission = scene.materials[0].surface.emission.clone().unwrap();
         assert_eq!((emission.radiance, emission.two_sided), (Vec3::splat(3.0), false));
     }
-    let sphere = |content: &str| {
-        let scene = load(&format!("<shape type=\"sphere\">{content}</shape>"));
+    let outward = |scene: Scene| {
         let corner = scene.geometry.triangles[0][0] as usize;
         winding(&scene).dot(Vec3::from(scene.geometry.positions[corner]).normalize()) > 0.0
     };
     let cube = |content: &str| {
         let scene = load(&format!("<shape type=\"cube\">{content}</shape>"));
+    let sphere =
+        |content: &str| outward(load(&format!("<shape type=\"sphere\">{content}</shape>")));
+    let instance = |content: &str| {
+        outward(load(&format!(
+            "<shape type=\"shapegroup\" id=\"group\"><shape type=\"sphere\">{content}</shape></shape>\
+             <shape type=\"instance\"><ref id=\"group\"/>{mirror}</shape>"
+        )))
+    };
         let centre = Vec3::from(scene.geometry.positions[scene.geometry.triangles[0][0] as usize]);
         (winding(&scene).dot(centre) > 0.0, scene.geometry.normals[0] == [0.0; 3])
     };
@@ -1053,6 +1060,7 @@ fn sides_are_those_of_mitsuba() {
     assert!(sphere("") && !sphere(mirror) && !sphere(flip) && sphere(&(mirror.to_owned() + flip)));
 }
 
+    assert!(instance("") && !instance(mirror) && !instance(flip));
 #[test]
 fn round_shapes_stand_where_they_should() {
     let scene = load(

@@ -34,8 +34,6 @@ pub(super) struct Shape {
     material: u32,
     /// True if triangles turn their other side out, by `flip_normals`.
     flips: bool,
-    /// True if a transform that mirrors turns them too: Mitsuba computes these normals after it.
-    flips_mirrored: bool,
     /// True for a mesh file, which is as large as it is.
     is_file: bool,
 }
@@ -43,13 +41,12 @@ pub(super) struct Shape {
 impl Shape {
     /// The mesh as it is under a transform that mirrors or not.
     fn turned(&self, mirrors: bool) -> Cow<'_, Mesh> {
-        let flips = self.flips != (self.flips_mirrored && mirrors);
         let mirrors_tangents = mirrors && !self.mesh.tangents.is_empty();
         if !flips && !mirrors_tangents {
             return Cow::Borrowed(&self.mesh);
         }
         let mut mesh = self.mesh.clone();
-        if flips {
+        if self.flips {
             mesh.reverse();
         }
         if mirrors_tangents {
@@ -183,6 +180,8 @@ impl Reader {
         let parameters = Parameters::new(node);
         let to_world = parameters.transform("to_world")?;
         let flips = parameters.boolean("flip_normals")?.unwrap_or(false);
+        // Mitsuba computes some normals after the shape's transform, though before that of an instance.
+        let mirrors = to_world.determinant() < 0.0;
         let mut shape = Shape { to_world, flips, ..Shape::default() };
         let radius = || Ok(parameters.float_in("radius", (1e-9, 1e9))?.unwrap_or(1.0));
         match node.kind() {
@@ -192,7 +191,7 @@ impl Reader {
                 shape.mesh = quadrics::cube();
                 if parameters.boolean("face_normals")?.unwrap_or(false) {
                     shape.mesh.normals.clear();
-                    shape.flips_mirrored = true;
+                    shape.flips ^= mirrors;
                 }
             }
             "disk" => shape.mesh = quadrics::disk(1.0, 0.0),
@@ -201,7 +200,7 @@ impl Reader {
                 shape.mesh = quadrics::sphere(radius()?);
                 shape.to_world *= DMat4::from_translation(center.as_dvec3());
                 // Mitsuba 3.9.1 turns mirrored spheres inside out, but no other round shape.
-                shape.flips_mirrored = true;
+                shape.flips ^= mirrors;
             }
             "cylinder" => {
                 let point = |name: &str, default: Vec3| {
@@ -268,7 +267,7 @@ impl Reader {
         if is_flat {
             mesh.normals.clear();
         }
-        shape.flips_mirrored = mesh.normals.is_empty();
+        shape.flips ^= mesh.normals.is_empty() && shape.to_world.determinant() < 0.0;
         if mesh.normals.is_empty() && !is_flat {
             mesh.normals = smooth_normals(&mesh);
         }
