@@ -1061,6 +1061,27 @@ fn sides_are_those_of_mitsuba() {
 }
 
     assert!(instance("") && !instance(mirror) && !instance(flip));
+}
+
+#[test]
+fn images_cover_the_triangles_of_meshes_without_coordinates() {
+    let folder = Folder::new();
+    folder.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 4 3 2\n");
+    let shape = |bsdf: &str| {
+        let file = "<string name=\"filename\" value=\"flat.obj\"/>";
+        let text = format!("{SENSOR}<shape type=\"obj\">{file}{bsdf}</shape>");
+        loaded(&folder.write("a.xml", document(&text))).geometry
+    };
+    let checkers = "<texture name=\"reflectance\" type=\"checkerboard\"/>";
+    let textured = shape(&format!("<bsdf type=\"diffuse\">{checkers}</bsdf>"));
+    let corners = textured.triangles.as_flattened().iter().map(|at| *at as usize);
+    let found: Vec<_> = corners.map(|at| (textured.positions[at], textured.uvs[0][at])).collect();
+    assert_eq!(found[1], ([1.0, 0.0, 0.0], [1.0, 0.0]));
+    assert_eq!(found[4], ([0.0, 1.0, 0.0], [1.0, 0.0]));
+    assert_eq!(found[5], ([1.0, 0.0, 0.0], [0.0, 1.0]));
+    assert_eq!((textured.positions.len(), textured.normals.len()), (6, 6));
+    assert_eq!(shape("").positions.len(), 4);
+    assert!(instance("") && !instance(mirror) && !instance(flip));
 #[test]
 fn round_shapes_stand_where_they_should() {
     let scene = load(

@@ -226,6 +226,9 @@ impl Reader {
         if !surface.vertex_color {
             shape.mesh.colors.clear();
         }
+        if surface.reads_uvs() && shape.mesh.uvs[0].is_empty() {
+            spread_image(&mut shape.mesh);
+        }
         // Heights bend along the axes of their image, whose directions the triangles have.
         let has_tangents = surface.normal.as_ref().is_some_and(|normal| !self.reliefs.hold(normal));
         if has_tangents && !shape.mesh.uvs[0].is_empty() {
@@ -334,6 +337,23 @@ fn frame_along(axis: DVec3) -> Option<DMat3> {
 }
 
 /// Tangents of vertices along u, as the bumps of a normal map need them: the bitangent is the normal ×
+/// Gives every triangle of a mesh without texture coordinates half of the image, as Mitsuba does.
+fn spread_image(mesh: &mut Mesh) {
+    fn repeat<T: Copy>(all: &mut Vec<T>, corners: &[u32]) {
+        if !all.is_empty() {
+            *all = corners.iter().map(|&corner| all[corner as usize]).collect();
+        }
+    }
+    let corners = mesh.triangles.as_flattened();
+    repeat(&mut mesh.positions, corners);
+    repeat(&mut mesh.normals, corners);
+    repeat(&mut mesh.colors, corners);
+    mesh.uvs[0] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].repeat(mesh.triangles.len());
+    for (first, triangle) in (0..).step_by(3).zip(&mut mesh.triangles) {
+        *triangle = [first, first + 1, first + 2];
+    }
+}
+
 /// the tangent, also where texture coordinates are mirrored.
 fn tangents(mesh: &Mesh) -> Vec<[f32; 4]> {
     let mut tangents = vec![Vec3::ZERO; mesh.positions.len()];
