@@ -112,6 +112,8 @@ fn transforms_are_those_of_mitsuba() {
     let x = Vec3::new(-0.980286, 0.0980286, -0.17155);
     let y = Vec3::new(-0.0240312, 0.802643, 0.595975);
     assert_close(found, -x - y + Vec3::new(1.0, 2.0, 3.0));
+    let found = first_vertex(r#"<lookat origin="0,0,0" target="0,0,-1"/>"#);
+    assert_close(found, Vec3::new(-1.0, -1.0, 0.0));
     let matrix = "1 2 3e0 0 0 1 5 1e-1 0 0 2 0 0 0 0 1";
     let found = first_vertex(&format!("<matrix value=\"{matrix}\"/>"));
     assert_close(found, Vec3::new(-3.0, -0.9, 0.0));

@@ -270,9 +270,9 @@ fn look_at(node: Node<'_>) -> Result<DMat4> {
     let Some(forward) = (target - origin).try_normalize() else {
         return Err(node.error("lookat: `origin` and `target` must differ"));
     };
-    // Mitsuba takes any direction across the view if there is none upwards.
+    // Mitsuba takes this direction across the view if there is none upwards.
     let up = point("up")?.unwrap_or(DVec3::ZERO);
-    let up = if up == DVec3::ZERO { forward.any_orthonormal_vector() } else { up };
+    let up = if up == DVec3::ZERO { forward.any_orthonormal_pair().0 } else { up };
     let Some(left) = up.cross(forward).try_normalize() else {
         return Err(node.error("lookat: `up` must not be along the view"));
     };
