@@ -1313,6 +1313,12 @@ fn ply_coordinates_and_colours_are_read() {
     assert_eq!(mesh.positions[4], mesh.positions[1]);
     assert_eq!(mesh.uvs[0], [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.5, 0.5]]);
     assert_eq!((mesh.colors[0], mesh.colors.len()), ([1.0, 0.0, 0.0, 1.0], 5));
+    let names = ["red", "green", "blue"].iter().enumerate();
+    let of_mitsuba = names.fold(text.to_owned(), |text, (index, name)| {
+        text.replace(&format!("diffuse_{name}"), &format!("color_{index}"))
+    });
+    let own = Mesh::read(&folder.write("b.ply", of_mitsuba), &mut Vec::new()).unwrap();
+    assert_eq!(own.colors, mesh.colors);
     let [header, number] = &warnings[..] else { panic!("{warnings:?}") };
     assert!(header.contains("other lines of the header (`Made by Blender`)"), "{header}");
     assert!(number.contains("ignored `texnumber` of faces"), "{number}");

@@ -35,10 +35,12 @@ const UV_NAMES: [[&str; 2]; 6] = [
 ];
 
 /// Names of colours, and of their opacity.
-const COLOR_NAMES: [[&str; 4]; 3] = [
+const COLOR_NAMES: [[&str; 4]; 4] = [
     ["red", "green", "blue", "alpha"],
     ["r", "g", "b", "a"],
     ["diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"],
+    // Mitsuba writes its attribute `vertex_color` so.
+    ["color_0", "color_1", "color_2", "color_3"],
 ];
 
 /// Bytes of a vertex (position, normal, coordinates) or of the triangles of a face.
