@@ -1044,8 +1044,6 @@ fn sides_are_those_of_mitsuba() {
         let corner = scene.geometry.triangles[0][0] as usize;
         winding(&scene).dot(Vec3::from(scene.geometry.positions[corner]).normalize()) > 0.0
     };
-    let cube = |content: &str| {
-        let scene = load(&format!("<shape type=\"cube\">{content}</shape>"));
     let sphere =
         |content: &str| outward(load(&format!("<shape type=\"sphere\">{content}</shape>")));
     let instance = |content: &str| {
@@ -1054,14 +1052,14 @@ fn sides_are_those_of_mitsuba() {
              <shape type=\"instance\"><ref id=\"group\"/>{mirror}</shape>"
         )))
     };
+    let cube = |content: &str| {
+        let scene = load(&format!("<shape type=\"cube\">{content}</shape>"));
         let centre = Vec3::from(scene.geometry.positions[scene.geometry.triangles[0][0] as usize]);
         (winding(&scene).dot(centre) > 0.0, scene.geometry.normals[0] == [0.0; 3])
     };
     assert_eq!(cube(mirror), (true, false));
     assert_eq!(cube(&(mirror.to_owned() + flat)), (false, true));
     assert!(sphere("") && !sphere(mirror) && !sphere(flip) && sphere(&(mirror.to_owned() + flip)));
-}
-
     assert!(instance("") && !instance(mirror) && !instance(flip));
 }
 
@@ -1083,7 +1081,8 @@ fn images_cover_the_triangles_of_meshes_without_coordinates() {
     assert_eq!(found[5], ([1.0, 0.0, 0.0], [0.0, 1.0]));
     assert_eq!((textured.positions.len(), textured.normals.len()), (6, 6));
     assert_eq!(shape("").positions.len(), 4);
-    assert!(instance("") && !instance(mirror) && !instance(flip));
+}
+
 #[test]
 fn round_shapes_stand_where_they_should() {
     let scene = load(
@@ -1330,7 +1329,7 @@ fn shapes_and_models_that_are_not_there_leave_the_rest() {
         <emitter type="projector"/>
         <shape type="sdfgrid"/><shape type="sdfgrid"/><shape type="ply">{}</shape>
         <shape type="ply">{}</shape>
-        <shape type="rectangle"><bsdf type="velvet"/></shape>
+        <shape type="rectangle"><bsdf type="velvet"/><emitter type="directionalarea"/></shape>
         <shape type="rectangle"><ref id="light"/><bsdf type="diffuse">{texture}</bsdf></shape>"#,
         file("absent.ply"),
         file("ball.PLY"),
@@ -1345,12 +1344,13 @@ fn shapes_and_models_that_are_not_there_leave_the_rest() {
         "that are not there (2, first in `absent.ply`, line 7)",
         "in another case (`ball.PLY`)",
         "`velvet`, which is diffuse of 0.5 (line 9)",
+        "ignored emitter `directionalarea` of a shape (line 9)",
     ] {
         let is_named = |text: &&String| text.contains(expected);
         let count = scene.warnings.iter().filter(is_named).count();
         assert_eq!(count, 1, "{expected}: {:#?}", scene.warnings);
     }
-    assert_eq!(scene.warnings.len(), 5, "{:#?}", scene.warnings);
+    assert_eq!(scene.warnings.len(), 6, "{:#?}", scene.warnings);
 }
 
 #[test]
@@ -1374,6 +1374,16 @@ fn images_that_cannot_be_read_leave_the_rest() {
     let [unreadable, absent] = &scene.warnings[..] else { panic!("{:#?}", scene.warnings) };
     assert!(unreadable.contains("a.xml: expected a PNG, JPEG"), "{unreadable}");
     assert!(absent.contains("that are not there (3, first in `../a.png`, line 5)"), "{absent}");
+}
+
+#[test]
+fn a_texture_in_a_checkerboard_is_its_mean() {
+    let (material, warnings) = material(
+        r#"<bsdf type="diffuse"><texture name="reflectance" type="checkerboard">
+          <texture name="color0" type="checkerboard"/></texture></bsdf>"#,
+    );
+    assert!((material.surface.color.unwrap().bias[0] - 0.3).abs() < 1e-6);
+    assert!(warnings[0].contains("textures of a `checkerboard`"), "{warnings:?}");
 }
 
 /// Values of Mitsuba 3.9.1.
@@ -1556,7 +1566,6 @@ fn bad_files_end_in_one_error_with_file_and_line() {
     let deep = "<bsdf type=\"twosided\">".repeat(40) + &"</bsdf>".repeat(40);
     for (content, expected) in [
         (shape("<ref id=\"absent\"/>"), "expected the id of an object, found `absent`"),
-        (shape("<emitter type=\"point\"/>"), "cannot stand in a shape"),
         (bsdf("<string name=\"reflectance\" value=\"red\"/>"), "expected a colour, found `string`"),
         (bsdf("<rgb name=\"reflectance\" value=\"2 2 2\"/>"), "expected 0 to 1"),
         (bsdf("<rgb name=\"reflectance\" value=\"$mood\"/>"), "`$mood` has no value"),

@@ -100,12 +100,12 @@ impl Reader {
         }))
     }
 
-    /// Reads the light of a shape; none if it has none.
-    pub(super) fn emission(&mut self, node: Node<'_>) -> Result<Emission> {
+    /// Reads the light of a shape; none if it is of another kind, which is named.
+    pub(super) fn emission(&mut self, node: Node<'_>) -> Result<Option<Emission>> {
         if node.kind() != "area" {
-            let found = node.kind();
-            let message = format!("the emitter `{found}` cannot stand in a shape; expected area");
-            return Err(node.error(message));
+            let name = format!("emitter `{}` of a shape", node.kind());
+            self.ignored.add_named(features::MI_EMITTER, &name, || node.place());
+            return Ok(None);
         }
         let parameters = Parameters::new(node);
         let value = self.value_or(&parameters, "radiance", Role::Light, 1.0)?;
@@ -115,7 +115,7 @@ impl Reader {
             return Err(node.error("radiance: expected a colour or a bitmap, found vertex colours"));
         }
         let (radiance, texture) = value.split();
-        Ok(Emission { radiance, texture, two_sided: false })
+        Ok(Some(Emission { radiance, texture, two_sided: false }))
     }
 }
 

@@ -42,7 +42,7 @@ impl Shape {
     /// The mesh as it is under a transform that mirrors or not.
     fn turned(&self, mirrors: bool) -> Cow<'_, Mesh> {
         let mirrors_tangents = mirrors && !self.mesh.tangents.is_empty();
-        if !flips && !mirrors_tangents {
+        if !self.flips && !mirrors_tangents {
             return Cow::Borrowed(&self.mesh);
         }
         let mut mesh = self.mesh.clone();
@@ -295,8 +295,9 @@ impl Reader {
             None if light.is_some() => diffuse(0.0),
             None => default_of_shapes(),
         };
-        if let Some(light) = light {
-            let mut emission = self.emission(light)?;
+        if let Some(light) = light
+            && let Some(mut emission) = self.emission(light)?
+        {
             // Mitsuba's lights shine where their surface is cut away too.
             let opacity = &mut material.surface.opacity;
             if opacity.factor == 0.0 || opacity.texture.is_some() {
@@ -336,7 +337,6 @@ fn frame_along(axis: DVec3) -> Option<DMat3> {
     Some(DMat3::from_cols(x, y, axis))
 }
 
-/// Tangents of vertices along u, as the bumps of a normal map need them: the bitangent is the normal ×
 /// Gives every triangle of a mesh without texture coordinates half of the image, as Mitsuba does.
 fn spread_image(mesh: &mut Mesh) {
     fn repeat<T: Copy>(all: &mut Vec<T>, corners: &[u32]) {
@@ -354,6 +354,7 @@ fn spread_image(mesh: &mut Mesh) {
     }
 }
 
+/// Tangents of vertices along u, as the bumps of a normal map need them: the bitangent is the normal ×
 /// the tangent, also where texture coordinates are mirrored.
 fn tangents(mesh: &Mesh) -> Vec<[f32; 4]> {
     let mut tangents = vec![Vec3::ZERO; mesh.positions.len()];

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    features::{self, Ignored},
+    features,
     import::Value,
     texture::{Encoding, Interpolation, Texels, Texture, TextureUse, Wrap},
 };
@@ -64,7 +64,7 @@ impl Reader {
                 Some(texture) => Value::Image(texture),
                 None => Value::Constant(Vec3::splat(0.5)),
             },
-            "checkerboard" => Value::Image(checkerboard(&parameters, &mut self.ignored)?),
+            "checkerboard" => Value::Image(self.checkerboard(&parameters, scales_left)?),
             "mesh_attribute" | "vertexcolors" => {
                 let name = parameters.string("name")?.unwrap_or("vertex_color");
                 let scale = Vec3::splat(parameters.float("scale")?.unwrap_or(1.0));
@@ -165,30 +165,42 @@ impl Reader {
         self.ignored.add(feature, || node.place());
         None
     }
-}
 
-/// Two colours on squares of half a unit: the first where both coordinates are in the same half.
-fn checkerboard(parameters: &Parameters<'_>, ignored: &mut Ignored) -> Result<TextureUse> {
-    let mut color = |name: &str, grey: f32| {
-        let node = parameters.any(name)?;
-        node.map_or(Ok(Vec3::splat(grey)), |node| spectra::reflectance(node, ignored))
-    };
-    let (first, second) = (color("color0", 0.4)?, color("color1", 0.2)?);
-    let (zero, one) = ([0, 0, 0, 255], [255; 4]);
-    let texture = Texture {
-        name: format!("checkerboard of {}", parameters.node.place()),
-        width: 2,
-        height: 2,
-        texels: Texels::Bytes(vec![zero, one, one, zero]),
-    };
-    Ok(TextureUse {
-        encoding: Encoding::Linear,
-        interpolation: Interpolation::Nearest,
-        image_from_uv: image_from_uv(parameters)?,
-        scale: (second - first).to_array(),
-        bias: first.to_array(),
-        ..TextureUse::new(Arc::new(texture))
-    })
+    /// Two colours on squares of half a unit: the first where both coordinates are in the same half.
+    fn checkerboard(
+        &mut self,
+        parameters: &Parameters<'_>,
+        scales_left: usize,
+    ) -> Result<TextureUse> {
+        let mut color = |name: &str, grey: f32| match parameters.any(name)? {
+            None => Ok(Vec3::splat(grey)),
+            Some(node) if node.tag() == "texture" && scales_left > 0 => {
+                let value = self.texture(node, scales_left - 1)?;
+                if !matches!(value, Value::Constant(_)) {
+                    let name = "textures of a `checkerboard`, of which the means count";
+                    self.ignored.add_named(features::MI_TEXTURE, name, || node.place());
+                }
+                Ok(value.mean().min(Vec3::ONE))
+            }
+            Some(node) => spectra::reflectance(node, &mut self.ignored),
+        };
+        let (first, second) = (color("color0", 0.4)?, color("color1", 0.2)?);
+        let (zero, one) = ([0, 0, 0, 255], [255; 4]);
+        let texture = Texture {
+            name: format!("checkerboard of {}", parameters.node.place()),
+            width: 2,
+            height: 2,
+            texels: Texels::Bytes(vec![zero, one, one, zero]),
+        };
+        Ok(TextureUse {
+            encoding: Encoding::Linear,
+            interpolation: Interpolation::Nearest,
+            image_from_uv: image_from_uv(parameters)?,
+            scale: (second - first).to_array(),
+            bias: first.to_array(),
+            ..TextureUse::new(Arc::new(texture))
+        })
+    }
 }
 
 /// Image coordinates from those of the mesh: (0, 0) is the upper left corner in Mitsuba 3 too, whose
