@@ -943,6 +943,12 @@ fn mixtures_are_linear_in_reflectance() {
     let clamp = "<string name=\"wrap_mode\" value=\"clamp\"/>";
     let (_, warnings) = mixed(&textured(a, clamp), &textured(b, ""), quarter);
     assert!(warnings[0].contains("gloss of `blendbsdf`"), "{warnings:?}");
+    // Three images of the same texels count texel by texel.
+    let (found, _) = mixed(&textured(a, ""), &textured(b, ""), &by_image);
+    let shares = [0.2126, 0.7152];
+    for ((texel, share), found) in texels.iter().zip(shares).zip(both((found, Vec::new()))) {
+        assert!(found.abs_diff_eq((a * texel).lerp(b * texel, share), 1e-3), "{found}");
+    }
 
     let metal = Vec3::new(0.9, 0.8, 0.7);
     let mirror = format!(

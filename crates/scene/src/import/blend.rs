@@ -134,19 +134,19 @@ fn blend_lobes(
     if place.is_none() {
         return Some((mixture(0).material(), rest));
     }
+    if let (MaterialKind::Diffuse { .. }, MaterialKind::Diffuse { .. }) = (first, second) {
+        let color = Some(grid.color(|index| mixture(index).diffuse));
+        let kind = MaterialKind::Diffuse { reflectance: Vec3::ONE };
+        return Some((kind, Surface { color, ..rest }));
+    }
     let images = grid.material(|index| {
         let lobes = mixture(index);
         let (base, metallic) = lobes.base_color(DIELECTRIC);
         (base.extend(1.0), lobes.roughness, metallic)
     });
-    let color = Some(images.base_color);
-    if let (MaterialKind::Diffuse { .. }, MaterialKind::Diffuse { .. }) = (first, second) {
-        let kind = MaterialKind::Diffuse { reflectance: Vec3::ONE };
-        return Some((kind, Surface { color, ..rest }));
-    }
     let kind = MaterialKind::Principled(Principled::default());
     let (roughness, metallic) = (Some(images.roughness), Some(images.metallic));
-    Some((kind, Surface { color, roughness, metallic, ..rest }))
+    Some((kind, Surface { color: Some(images.base_color), roughness, metallic, ..rest }))
 }
 
 /// Reflection of a material as a diffuse and a specular part.
