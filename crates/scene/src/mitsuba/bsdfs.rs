@@ -210,6 +210,7 @@ impl Reader {
     fn bump_map(&mut self, parameters: &Parameters<'_>) -> Result<Material> {
         let mut model = self.inner(parameters)?;
         let scale = Vec3::splat(parameters.float("scale")?.unwrap_or(1.0));
+        parameters.without_effect("flip_invalid_normals use_shadowing_function");
         for texture in parameters.objects("texture")? {
             match self.texture(texture, MAX_SCALES)? {
                 // One height everywhere bends nothing.
