@@ -189,6 +189,9 @@ fn the_first_blocks_have_the_samples_of_a_stopped_sweep() {
     // A constant picture stays constant, by whatever part of a sample a pixel has.
     sums.sum.fill([4.0; 3]);
     sums.pending = (0..192).map(|pixel| [(sums.samples(pixel) - 4) as f32; 3]).collect();
+    sums.albedo = (0..192).map(|pixel| [0.5 * sums.samples(pixel) as f32; 3]).collect();
+    let albedo = &sums.to_image(&[Aov::Albedo]).channels["Albedo.G"];
+    assert!(albedo.iter().all(|albedo| *albedo == 0.5), "{albedo:?}");
     // A group of lights brings a quarter of it.
     let quarter = |of: &[[f32; 3]]| of.iter().map(|value| value.map(|v| 0.25 * v)).collect();
     let group = GroupSums {
@@ -203,6 +206,18 @@ fn the_first_blocks_have_the_samples_of_a_stopped_sweep() {
             assert!((sums.mean(pixel)[1] - 1.0).abs() < 1e-12, "pixel {pixel}");
             assert!((sums.group_means(&group)(pixel)[1] - 0.25).abs() < 1e-12, "pixel {pixel}");
         }
+    }
+    // The first row of blocks alone is ahead, by a sample of 1: the row below has as much of it as the filter
+    // reaches, the next one nothing.
+    sums.sum.fill([0.0; 3]);
+    sums.ahead = Ahead { blocks: 2, offset: Some([0.2, 0.3]) };
+    sums.pending = (0..192).map(|pixel| [(sums.samples(pixel) - 4) as f32; 3]).collect();
+    let [above, own, below] =
+        [-0.7_f64, 0.3, 1.3].map(|distance| (-0.5 * (distance / 0.5).powi(2)).exp());
+    let share = above / (above + own + below);
+    for (row, expected) in [(0, 0.2), (6, 0.2), (8, share / (4.0 + share)), (9, 0.0)] {
+        let found = sums.mean(12 * row + 5)[1];
+        assert!((found - expected).abs() < 1e-6, "row {row}: {found}, expected {expected}");
     }
 }
 
