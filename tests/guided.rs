@@ -516,6 +516,31 @@ fn visible_rays_teach_how_surfaces_respond() {
     support::assert_silent();
 }
 
+/// A look at a pixel teaches the guide, so that rays of the picture must not meet its numbers again.
+#[test]
+fn a_look_at_a_pixel_draws_numbers_of_its_own() {
+    let _alone = support::alone();
+    let scene = small(scenes::mixed_room());
+    let mut renderer = support::renderer(&scene, guided(1));
+    renderer.render_pass(1).unwrap();
+    let at = [8, 8];
+    let rays = |renderer: &mut Renderer, of: Option<u32>| {
+        let explained = match of {
+            Some(seed) => renderer.explain_learned(seed, at, 40),
+            None => renderer.inspect_pixel(at),
+        };
+        explained.unwrap().unwrap().numbers()["rays"].clone()
+    };
+    let seed = renderer.settings().seed;
+    let own = rays(&mut renderer, Some(seed));
+    assert_eq!(rays(&mut renderer, Some(seed)), own);
+    let looked = rays(&mut renderer, None);
+    assert_eq!(looked.as_array().map(Vec::len), Some(40));
+    assert!(looked.as_array().unwrap().iter().all(|ray| !own.as_array().unwrap().contains(ray)));
+    assert_eq!(rays(&mut renderer, None), looked);
+    support::assert_silent();
+}
+
 #[test]
 fn visible_rays_teach_the_share_of_the_brdf() {
     let _alone = support::alone();
