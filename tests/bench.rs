@@ -1,6 +1,8 @@
 //! `fenestra bench` on a small scene: every figure is there, and device and CPU see the same hits.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
+use serde_json::Value;
+
 use crate::support::command::Folder;
 
 fn folder() -> Folder {
@@ -11,9 +13,9 @@ fn folder() -> Folder {
 #[test]
 fn every_figure_is_there() {
     let folder = folder();
-    let run = folder.run(&["bench", "scene.toml", "--repetitions", "2", "--json"]);
+    let run = folder.run(&["bench", "scene.toml", "--repetitions", "3", "--json"]);
     run.assert(0, &[]);
-    let report: serde_json::Value = serde_json::from_str(&run.output).unwrap();
+    let report: Value = serde_json::from_str(&run.output).unwrap();
     assert_eq!(report["triangles"], 24);
     assert_eq!(report["film"], serde_json::json!([61, 47]));
     let rates = report["rays"].as_array().unwrap();
@@ -32,6 +34,13 @@ fn every_figure_is_there() {
     for pass in ["camera", "trace", "sample", "shadow", "gather", "accumulate"] {
         assert!(report["pass_ms"][pass].as_f64().unwrap() > 0.0, "{pass}");
     }
+    // All passes of one sample take as long as its shadow rays by their rate.
+    let ms: f64 = report["pass_ms"].as_object().unwrap().values().filter_map(Value::as_f64).sum();
+    let at = |rate: &str| {
+        rates[1]["rays"].as_f64().unwrap() * 1e-3
+            / report["all_passes_mrays"][rate].as_f64().unwrap()
+    };
+    assert!((0.9 * at("most")..1.1 * at("least")).contains(&ms), "{ms} ms");
     assert!(report["compile_ms"]["pipelines"].as_f64().unwrap() > 0.0);
     assert_eq!(report["buffer_bytes"]["triangles 0"], 24 * 48);
     assert!(report["shadow_pass_share"]["median"].as_f64().unwrap() < 1.0);
