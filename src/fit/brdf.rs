@@ -242,3 +242,40 @@ fn summarize(fit: &BrdfFit, targets: &[HemisphereTarget]) -> BrdfSummary {
         largest_chi_squared_between: chi_squared_between.fold(0.0, f64::max),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::hemisphere::HemisphereSample;
+
+    /// Views near the horizon, which no lobes can match, belong to no figure of the summary.
+    #[test]
+    fn summaries_leave_out_the_last_views() {
+        const VIEWS: usize = 9;
+        let target = sample_hemisphere(&|_| 1.0, DVec3::Z);
+        assert!(target.samples.iter().all(|HemisphereSample { value, .. }| *value == 1.0));
+        let targets = vec![target; 2 * VIEWS - 1];
+        let summary = |last: Lobe| {
+            let plain = Lobe { axis: Vec3::Z, bandwidth: 1.0, amplitude: 1.0 };
+            let view = |index: usize| {
+                let lobes = vec![if index + 1 == VIEWS { last } else { plain }];
+                let errors = judge_hemisphere(&targets[2 * index], &lobes);
+                BrdfView { theta: view_theta(index, VIEWS) as f32, albedo: 1.0, errors, lobes }
+            };
+            let fit = BrdfFit {
+                source: String::new(),
+                method: Method::Em,
+                requested_lobes: 1,
+                views: (0..VIEWS).map(view).collect(),
+                summary: BrdfSummary::default(),
+                notes: Vec::new(),
+                seconds: 0.0,
+                is_cached: false,
+            };
+            summarize(&fit, &targets)
+        };
+        let expected = summary(Lobe { axis: Vec3::Z, bandwidth: 1.0, amplitude: 1.0 });
+        assert!(expected.largest_chi_squared_between > 0.0);
+        assert_eq!(summary(Lobe { axis: Vec3::X, bandwidth: 300.0, amplitude: 1.0 }), expected);
+    }
+}

@@ -180,3 +180,26 @@ fn interpolate(a: &Lobe, b: &Lobe, t: f64) -> Lobe {
     };
     shape.lobe(1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    /// Halfway between two views, bandwidths have their geometric mean and energies the arithmetic one.
+    #[test]
+    fn lobes_between_views_have_the_mean_of_their_logarithms() {
+        let lobe = |bandwidth, share| Component { axis: DVec3::Z, bandwidth, share }.lobe(1.0);
+        let [a, b] = [lobe(4.0, 1.0), lobe(100.0, 3.0)];
+        let found = interpolate(&a, &b, 0.5);
+        assert!((found.bandwidth / 20.0 - 1.0).abs() < 1e-5, "{found:?}");
+        assert!((lobe_energy(&found) - 2.0).abs() < 1e-5, "{found:?}");
+        let found = interpolate(&a, &b, 0.25);
+        assert!((lobe_energy(&found) - 1.5).abs() < 1e-5, "{found:?}");
+        // A lobe without energy at one end keeps the shape of the other.
+        let found = interpolate(&a, &Lobe { amplitude: 0.0, ..b }, 0.5);
+        assert!((found.bandwidth - 4.0).abs() < 1e-4, "{found:?}");
+        assert!((lobe_energy(&found) - 0.5).abs() < 1e-5, "{found:?}");
+    }
+}

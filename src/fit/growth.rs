@@ -165,3 +165,22 @@ pub(crate) fn grow(
     components.retain(|component| component.share > 0.0);
     components
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn components_are_split_along_their_longest_axis() {
+        // Variances 4 and 1 along two directions of the tangent plane, and 9 along the axis itself.
+        for turn in [0.0_f64, 0.4, 1.3, 2.0, 3.0] {
+            let (long, across) = (DVec3::new(turn.cos(), turn.sin(), 0.0), DVec3::Z);
+            let short = across.cross(long);
+            let outer = |v: DVec3| DMat3::from_cols(v.x * v, v.y * v, v.z * v);
+            let covariance = outer(long) * 4.0 + outer(short) + outer(across) * 9.0;
+            let (largest, direction, smallest) = principal(covariance, across);
+            assert!((largest - 4.0).abs() < 1e-12 && (smallest - 1.0).abs() < 1e-12);
+            assert!((direction.dot(long).abs() - 1.0).abs() < 1e-12, "{direction} for {long}");
+        }
+    }
+}
