@@ -89,3 +89,16 @@ impl Totals {
         .into()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_living_are_counted_at_the_vertices_that_paths_may_reach() {
+        // Ten paths of four vertices: six bounce once, three of them again, and none a third time.
+        let totals = Totals { camera_rays: 10, bounce_rays: 9, ..Totals::default() };
+        assert!((totals.living_share(4) - 0.3).abs() < 1e-12);
+        assert_eq!(totals.living_share(1), 1.0);
+    }
+}

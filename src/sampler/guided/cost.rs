@@ -272,6 +272,25 @@ mod tests {
     use super::*;
     use crate::math::random::hash_4d;
 
+    #[test]
+    fn variances_and_their_errors_are_those_of_the_books() {
+        let mut spread = Spread::default();
+        spread.add(0, &[[1.0, 2.0, 0.0], [3.0, 2.0, 2.0], [2.0, 2.0, 4.0]]);
+        // Unbiased variances 1, 0 and 4 of the channels.
+        assert!((spread.blocks[0].variances[0] - 5.0 / 3.0).abs() < 1e-12, "{spread:?}");
+        assert!((spread.blocks[0].sum - 6.0).abs() < 1e-12, "{spread:?}");
+        let of = |logarithms: &[f64]| RelativeVariance {
+            raw: 1.0,
+            trimmed: 1.0,
+            logarithms: logarithms.to_vec(),
+        };
+        // Differences 0, 1 and 5: mean 2, deviation √7, and that of a median is a quarter more.
+        let (middle, error) = log_ratio(&of(&[1.0, 2.0, 6.0, f64::INFINITY]), &of(&[1.0; 4]));
+        assert_eq!(middle, 1.0);
+        assert!((error - 1.25 * (7.0_f64 / 3.0).sqrt()).abs() < 1e-12, "{error}");
+        assert_eq!(log_ratio(&of(&[2.0]), &of(&[1.0])), (1.0, UNKNOWN_ERROR));
+    }
+
     /// An arm whose samples are known: its time, and the deviation of its samples relative to their mean.
     #[derive(Clone, Copy)]
     struct Planted {

@@ -31,3 +31,22 @@ pub fn bounds_of(scene: &Scene) -> [Vec3; 2] {
     let bounds = instance::bounds(scene.geometry.used_extent());
     bounds.unwrap_or([Vec3::INFINITY, Vec3::NEG_INFINITY])
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn cells_are_as_large_as_pixels_and_parts_of_the_scene() {
+        let text = "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 90\n\
+                    [film]\nwidth = 400\nheight = 100\n\
+                    [[material]]\nname = \"m\"\ntype = \"diffuse\"\nreflectance = [0, 0, 0]\n\
+                    [[object]]\nshape = \"box\"\nsize = [1, 8, 2]\nmaterial = \"m\"\n";
+        let scene = Scene::parse(Path::new("a.toml"), text).unwrap();
+        // A pixel takes 2 tan 45° / 100 of the distance.
+        let [pixels, largest] = cell_edges(&scene, 3.0);
+        assert!((pixels - 0.06).abs() < 1e-6 && (largest - 0.4).abs() < 1e-6, "{pixels} {largest}");
+    }
+}
