@@ -355,4 +355,21 @@ mod tests {
             assert!((drawn - expected).abs() < 1e-5, "{drawn}, expected {expected}");
         }
     }
+
+    /// A cluster of a lamp and another of three times its power lies three quarters of the way to it.
+    #[test]
+    fn clusters_lie_in_the_middle_of_their_power() {
+        let accel = Accel::build(&Default::default(), 1 << 20).unwrap();
+        let source = |index: u32, power: f64, x: f32| Source {
+            source: LAMP_BIT | index,
+            power,
+            centre: Some(Vec3::X * x),
+        };
+        let sources = [source(0, 1.0, 0.0), source(1, 3.0, 4.0), source(2, 4.0, 9.0)];
+        let mut tables = LampTables { total: 8.0, ..LampTables::default() };
+        tables.add_table(&sources, &[0, 1, 2]);
+        tables.add_clusters(&accel, &sources, &[vec![0, 1], vec![2]]);
+        let found: Vec<_> = tables.clusters.iter().map(|own| (own.power, own.centre)).collect();
+        assert_eq!(found, [(4.0, Some(Vec3::X * 3.0)), (4.0, Some(Vec3::X * 9.0))]);
+    }
 }
