@@ -89,3 +89,31 @@ fn write_corner(words: &mut [u32], geometry: &Geometry, bits: u32, vertex: usize
         [red | green << 16, blue | alpha << 16]
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Instance, transform::Transform};
+
+    #[test]
+    fn meshes_without_colours_are_white_beside_others() {
+        let mesh = |colors: Vec<[f32; 4]>| Geometry {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            normals: vec![[0.0, 0.0, 1.0]; 3],
+            colors,
+            triangles: vec![[0, 1, 2]],
+            materials: vec![0],
+            ..Geometry::default()
+        };
+        let stay = Transform::new([1.0; 3], [0.0; 3], [0.0; 3]);
+        let geometry = Geometry {
+            prototypes: vec![mesh(vec![[0.0, 0.5, 1.0, 0.5]; 3])],
+            instances: Instance::new(0, &stay, 0, false).into_iter().collect(),
+            ..mesh(Vec::new())
+        };
+        let accel = Accel::build(&geometry, 1 << 20).unwrap();
+        let words = TriangleAttributes::new(&geometry, &accel, ATTRIBUTE_COLOR).words;
+        let expected = [[u32::MAX; 2], [0x8000_0000, 0x8000_ffff]].map(|own| [own; 3]);
+        assert_eq!(words, expected.as_flattened().as_flattened());
+    }
+}

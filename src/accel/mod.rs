@@ -415,3 +415,22 @@ fn record(geometry: &Geometry, triangle: u32) -> TriangleRecord {
     });
     TriangleRecord { vertices }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_are_padded_by_the_distance_from_the_origin() {
+        let corner = |y: f32, z: f32| [1e6, y, z];
+        let geometry = Geometry {
+            positions: vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)],
+            triangles: vec![[0, 1, 2]],
+            ..Geometry::default()
+        };
+        // 2⁻²⁰ of a million metres.
+        let boxes = padded_boxes(&geometry, &[0]);
+        assert!((boxes[0].max.x - 1e6 - 0.954).abs() < 0.1, "{boxes:?}");
+        assert!((boxes[0].min.y + 0.954).abs() < 0.1, "{boxes:?}");
+    }
+}
