@@ -99,4 +99,21 @@ mod tests {
         let ratio = squares[1] / squares[0] / variance_share(Filter::Gaussian);
         assert!((1.0..1.08).contains(&ratio), "{ratio}");
     }
+
+    /// One sample is bright, in the second row of the left column.
+    #[test]
+    fn samples_are_spread_along_both_axes_by_their_own_offsets() {
+        let offset = [0.4, -0.25];
+        let mut samples = vec![[0.0; 3]; 12];
+        samples[3] = [1.0; 3];
+        let found = filtered(&samples, 3, offset);
+        let share = |place: usize, of: usize, end: usize, axis: usize| {
+            let weights = weights(falloff(offset[axis]), [place > 0, true, place + 1 < end]);
+            (of + 1).checked_sub(place).and_then(|at| weights.get(at)).copied().unwrap_or(0.0)
+        };
+        for (index, value) in found.iter().enumerate() {
+            let expected = share(index % 3, 0, 3, 0) * share(index / 3, 1, 4, 1);
+            assert!((f64::from(value[1]) - expected).abs() < 1e-6, "{index}: {value:?}");
+        }
+    }
 }

@@ -260,6 +260,10 @@ mod tests {
     fn the_forecast_forgets_a_slow_start() {
         let mut rate = Rate::from(0);
         assert_eq!(rate.seconds_of(1.0), None);
+        let mut told_of_looks = Rate::from(0);
+        told_of_looks.note(2.0, 4);
+        told_of_looks.wall_share = 1.5;
+        assert_eq!(told_of_looks.seconds_of(8.0), Some(6.0), "looks take half as long as passes");
         let seconds =
             |samples: u32| f64::from(samples.min(8)) + 0.25 * f64::from(samples.saturating_sub(8));
         let mut told = Vec::new();
