@@ -316,6 +316,10 @@ fn compensation_leaves_what_the_brdf_does_not_find() {
         assert!((uv.x - 20.5).abs() < 1.001 && (uv.y - 3.5).abs() < 1.001, "{uv}");
     }
     assert_eq!(tables.pdf(&sun, Vec3::NEG_Y, sun.radiance(Vec3::NEG_Y)), 0.0);
+    // Half of the mean over the sphere, of which a cap above y = 0.9 is a twentieth.
+    let cap = scenes::environment(512, |to| Vec3::splat(if to.y > 0.9 { 4.0 } else { 1.0 }));
+    let compensation = EnvironmentTables::compensated(&cap).compensation;
+    assert!((compensation - 0.575).abs() < 0.005, "{compensation}");
     // Without contrast there is nothing to leave out: the density stays as it is.
     let constant = EnvironmentMap::constant(Vec3::ONE, 2.0).unwrap();
     let [plain, tables] = tables_of(&constant);

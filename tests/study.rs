@@ -173,6 +173,12 @@ fn a_study_has_every_figure() {
     assert!(check["description"].as_str().unwrap().starts_with("env, two halves of "), "{check}");
     assert_ne!(check["verdict"], "disagrees", "{check}");
     assert!(check["spp"].as_u64().unwrap() >= 2 && check["seconds"].as_f64().unwrap() > 0.0);
+    let seeds = [1, 2].map(|half| {
+        let path = folder.path().join(format!("report/images/yard/reference_check_{half}.exr"));
+        let metadata = Metadata::load(&Image::read_exr(&path).unwrap(), &path).unwrap();
+        metadata.sample_ranges[0].seed
+    });
+    assert_ne!(seeds[0], seeds[1]);
     assert!(results["circumstances"]["device"].is_string());
     let share = results["scenes"][0]["parts"]["surface_share"].as_f64().unwrap();
     assert!(share > 0.0 && share < 1.0, "the sky is in the frame: {share}");
