@@ -368,6 +368,10 @@ fn numbers_that_cannot_be_rendered_are_refused_by_name() {
         &set("= 40", "= nan"),
         "camera.vertical_fov_deg: expected a number from 0.01 to 179, found NaN",
     );
+    case(
+        &set("= 40", "= 40\nshift = [0, -2e5]"),
+        "camera.shift: expected a number from -100000 to",
+    );
     case(&set("[0, 1, 5]", "[0, inf, 5]"), "camera.position: expected a finite number, found inf");
     case(
         &set("[0, 1, 5]", "[0, 1e300, 5]"),

@@ -285,7 +285,7 @@ impl<'a> Loader<'a> {
         let up = self.vector("camera.up", entry.up, FINITE)?;
         self.check_range("camera.vertical_fov_deg", &[entry.vertical_fov_deg], (0.01, 179.0))?;
         self.check_range("camera.aperture_radius", &[entry.aperture_radius], (0.0, f32::MAX))?;
-        self.check_range("camera.shift", &entry.shift, (-100.0, 100.0))?;
+        self.check_range("camera.shift", &entry.shift, (-1e5, 1e5))?;
         let view = look_at - position;
         let Some(view_direction) = view.try_normalize() else {
             return Err(self.error(format!(
