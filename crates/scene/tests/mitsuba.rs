@@ -1485,6 +1485,11 @@ fn a_file_asks_for_samples_and_depth() {
     let endless = r#"<integrator type="path"><integer name="max_depth" value="-1"/></integrator>"#;
     let unstated = asked(r#"<integrator type="path"/>"#);
     assert_eq!((asked(endless), unstated, asked("")), (Some(64), Some(64), None));
+    for (edges, warnings) in [(1, 1), (2, 0)] {
+        let integrator = endless.replace("-1", &edges.to_string());
+        let scene = load(&integrator);
+        assert_eq!((scene.asked.depth, scene.warnings.len()), (Some(1), warnings), "{edges}");
+    }
 }
 
 /// Radiances of Mitsuba 3.9.1 from the direction of the sun's place at a date.

@@ -100,7 +100,13 @@ impl Reader {
                 // Mitsuba counts the edges of a path, the one to the light included.
                 self.asked.depth = match parameters.integer("max_depth")? {
                     None | Some(-1) => Some(Asked::MAX_DEPTH),
-                    Some(edges) => Some((edges - 1).clamp(1, i64::from(Asked::MAX_DEPTH)) as u32),
+                    Some(edges) => {
+                        if edges < 2 {
+                            let name = "`max_depth` below 2, for which direct light is rendered";
+                            self.ignored.add_named(features::MI_INTEGRATOR, name, || node.place());
+                        }
+                        Some((edges - 1).clamp(1, i64::from(Asked::MAX_DEPTH)) as u32)
+                    }
                 };
                 let roulette = parameters.integer("rr_depth")?;
                 let roulette = roulette.and_then(|depth| u32::try_from(depth).ok());
