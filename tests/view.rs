@@ -8,6 +8,7 @@ use bytemuck::Pod;
 use fenestra::{
     film::Image,
     gpu::{Buffer, Commands, DescriptorSet, Pipeline},
+    math::colour::srgb_to_linear,
     shader::{
         bindings::{Binding, BindingTable, FILM, VIEW, film, view},
         constants::{
@@ -390,12 +391,7 @@ fn layers_are_shown_as_means() {
 fn films_inset_and_controls_have_their_places() {
     let _alone = support::alone();
     // Levels of linear values.
-    let grey = |level: u8| {
-        let share = f32::from(level) / 255.0;
-        let value =
-            if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) };
-        [value; 3]
-    };
+    let grey = |level: u8| [srgb_to_linear(f32::from(level) / 255.0); 3];
     let left = [10, 20, 30, 40].map(grey);
     let right = [50, 60, 70, 80, 90, 100, 110, 120].map(grey);
     let inset = [0xff03_0201_u32, 0xff06_0504];

@@ -165,8 +165,8 @@ impl OpenPassages<'_> {
         let opacity = surface_opacity(&self.textures, &of.uses, surface, uvs, color.w);
         let mut shares =
             Passing { passed: Vec3::splat(1.0 - opacity), stopped: Vec3::splat(opacity) };
-        let mut material = of.materials[index as usize];
-        if material.kind == MATERIAL_THIN_DIELECTRIC {
+        if of.materials[index as usize].kind == MATERIAL_THIN_DIELECTRIC {
+            let mut material = of.materials[index as usize];
             let factor = surface_color(&self.textures, &of.uses, surface, uvs, color.truncate());
             material.eta =
                 (Vec3::from(material.eta) * factor).clamp(Vec3::ZERO, Vec3::ONE).to_array();

@@ -22,11 +22,10 @@ pub(crate) fn hash(scene: &Scene) -> String {
         let camera = &scene.camera;
         hasher.array(&[camera.position, camera.look_at, camera.up]);
         hasher.array(&[camera.vertical_fov_deg, camera.aperture_radius, camera.focus_distance]);
-        if camera.shift != [0.0; 2] {
-            hasher.array(&[camera.shift]);
-        }
-        if camera.mirrored {
-            hasher.length(1);
+        // Few cameras have these: the hashes of all others are those of before.
+        if (camera.shift, camera.mirrored) != ([0.0; 2], false) {
+            hasher.array(&camera.shift);
+            hasher.array(&[u32::from(camera.mirrored)]);
         }
         hasher.still(scene);
     })

@@ -115,15 +115,12 @@ impl LibraryMaterial {
             })
         } else if is_pane {
             // The image varies the colour of what the pane does not let through.
-            let mut transmittance = self.filter.unwrap_or(Vec3::ONE.lerp(diffuse, opacity));
-            if self.filter.is_some() {
-                surface.color = None;
-            } else if let Some(image) = &mut surface.color {
-                transmittance = Vec3::ONE;
-                image.scale = (opacity * diffuse * Vec3::from(image.scale)).to_array();
-                image.bias =
-                    (opacity * diffuse * Vec3::from(image.bias) + (1.0 - opacity)).to_array();
-            }
+            let image = surface.color.take().filter(|_| self.filter.is_none());
+            surface.color =
+                image.map(|image| image.affine(opacity * diffuse, Vec3::splat(1.0 - opacity)));
+            let tint = Vec3::ONE.lerp(diffuse, opacity);
+            let tint = if surface.color.is_some() { Vec3::ONE } else { tint };
+            let transmittance = self.filter.unwrap_or(tint);
             MaterialKind::ThinDielectric { ior, reflectance: Vec3::ONE, transmittance }
         } else if is_glossy && matches!(self.model, 3 | 5) && diffuse.max_element() <= BLACK {
             MaterialKind::Mirror { reflectance: self.specular }
