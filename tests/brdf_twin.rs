@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use fenestra::shader::{
     bindings::scene,
-    constants::{CONSTANT_SURFACES, MATERIAL_MEASURED, SURFACES_ANISOTROPIC},
+    constants::{CONSTANT_SURFACES, MATERIAL_MEASURED, SURFACES_ANISOTROPIC, SURFACES_BECKMANN},
 };
 use glam::Vec3;
 
@@ -65,7 +65,7 @@ fn shader_agrees_with_its_twin() {
     let queries: Vec<BrdfQuery> = (0..20_000).map(query).collect();
     let answers: Vec<BrdfAnswer> = support::run_probe(
         "brdf",
-        &[(CONSTANT_SURFACES, SURFACES_ANISOTROPIC)],
+        &[(CONSTANT_SURFACES, SURFACES_ANISOTROPIC | SURFACES_BECKMANN)],
         &[
             (scene::MATERIALS, bytemuck::cast_slice(&tables().materials)),
             (scene::BRDF_TABLE, bytemuck::cast_slice(&tables().words)),
@@ -146,7 +146,7 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
     let queries: Vec<SpecularQuery> = (0..20_000).map(query).collect();
     let answers: Vec<SpecularAnswer> = support::run_probe(
         "specular",
-        &[],
+        &[(CONSTANT_SURFACES, SURFACES_BECKMANN)],
         &[(scene::MATERIALS, bytemuck::cast_slice(specular()))],
         &queries,
     );

@@ -11,7 +11,7 @@ use fenestra::{
         Scene,
         export::{Settings, gltf, mitsuba::export, pbrt},
         lamp::LampKind,
-        material::{Material, MaterialKind, Surface},
+        material::{Distribution, Material, MaterialKind, Surface},
         measured::{MeasuredTable, RglTraits},
         texture::{TextureUse, Wrap},
     },
@@ -674,6 +674,29 @@ fn stretched_highlights_are_written() {
             let turned = found.surface.anisotropy.rotation - material.surface.anisotropy.rotation;
             assert!(!is_exact || turned.abs() < 1e-6, "{text}{turn}: {turned}");
         }
+    }
+}
+
+/// Beckmann's normals come back from Mitsuba's models, and are named where a format has none.
+#[test]
+fn distributions_are_written_or_named() {
+    let glass = "type = \"dielectric\"\nalpha = 0.2";
+    let plastic = "type = \"plastic\"\nalpha = 0.2\ndiffuse = [0.5, 0.5, 0.5]";
+    let metal = "type = \"conductor\"\nalpha = 0.2\neta = [0.2, 0.9, 1.1]\nk = [3.9, 2.4, 2.2]";
+    let by_color = "type = \"conductor\"\nalpha = 0.2\nreflectance = [0.9, 0.8, 0.7]";
+    for (text, is_written) in [(glass, true), (plastic, true), (metal, true), (by_color, false)] {
+        let (folder, _, warnings, [ours, read]) =
+            both(&format!("{text}\ndistribution = \"beckmann\""), "");
+        let is_named = |warnings: &[String]| {
+            warnings.iter().any(|text| text.contains("its microfacets become GGX"))
+        };
+        assert_eq!(is_named(&warnings), !is_written, "{warnings:?}");
+        let found = read.materials.iter().find(|own| own.name == ours.materials[0].name);
+        let found = found.unwrap_or(&read.materials[0]).surface.distribution;
+        assert_eq!(found == Distribution::Beckmann, is_written, "{text}");
+        let path = folder.path().join("out");
+        assert!(is_named(&gltf::export(&ours, &path.with_extension("gltf")).warnings), "{text}");
+        assert!(is_named(&pbrt::export(&ours, &path.with_extension("pbrt"), SETTINGS).warnings));
     }
 }
 

@@ -29,6 +29,7 @@ fn sources() -> String {
         "file/value.rs",
         "lib.rs",
         "lamp.rs",
+        "material.rs",
         "texture/mod.rs",
         "environment/court.rs",
         "environment/sky.rs",

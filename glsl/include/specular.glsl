@@ -36,12 +36,13 @@ vec3 refracted(vec3 outgoing_local, vec3 normal, float eta) {
     return (cosine / eta - refracted_cosine(cosine, eta)) * normal - outgoing_local / eta;
 }
 
-// Interface of a dielectric: smooth at alpha = 0, else GGX by visible normals. [Walter et al. 2007].
+// Interface of a dielectric: smooth at alpha = 0, else by GGX's visible normals. [Walter et al. 2007].
 Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back, vec3 u) {
     float eta = relative_index(material, is_back);
     vec3 normal = vec3(0.0, 0.0, 1.0);
+    GgxWidth width = material_width(material);
     if (material.alpha > 0.0) {
-        normal = ggx_normal_sample(outgoing_local, round_width(material.alpha), 1.0, u.yz);
+        normal = ggx_normal_sample(outgoing_local, width, 1.0, u.yz);
     }
     float cosine = dot(outgoing_local, normal);
     float fresnel = fresnel_interface(cosine, eta);
@@ -57,8 +58,7 @@ Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back,
     }
     if (material.alpha > 0.0) {
         result.weight *=
-            ggx_masking_ratio(
-                outgoing_local, result.direction_local, round_width(material.alpha));
+            visible_normal_ratio(normal, outgoing_local, result.direction_local, width);
     }
     // A normal may send light to the wrong side of the surface: no sample.
     if (cosine <= 0.0 || (result.direction_local.z < 0.0) != result.is_transmitted) {

@@ -302,5 +302,6 @@ GgxWidth stretched_width(
     // Twice the angle of the direction, since both of its ends are alike.
     vec2 twice = turned_by(direction, direction);
     return GgxWidth(
-        mean, (along - alpha) / (along + alpha) * twice * inversesqrt(max(dot(twice, twice), 1.0e-30)));
+        mean, (along - alpha) / (along + alpha) * twice * inversesqrt(max(dot(twice, twice), 1.0e-30)),
+        false);
 }

@@ -34,11 +34,10 @@ fn grid(points: u32) -> impl Iterator<Item = Vec2> {
     })
 }
 
-/// Directional albedo of a GGX surface; `fresnel` maps the cosine between direction and half vector
-/// to reflectance. Sums visible-normal samples at the midpoints of a grid: each weight is at most
-/// about 1, so 64² points are accurate to 1e-4.
-fn ggx_albedo(outgoing: Vec3, alpha: f32, points: u32, fresnel: impl Fn(f32) -> Vec3) -> Vec3 {
-    let width = GgxWidth::round(alpha);
+/// Directional albedo of microfacets of one width in all directions; `fresnel` maps the cosine between
+/// direction and half vector to reflectance. Sums visible-normal samples of GGX at the midpoints of a grid:
+/// its weights are at most about 1, so 64² points are accurate to 1e-4, those of Beckmann's normals 2.6.
+fn ggx_albedo(outgoing: Vec3, width: GgxWidth, points: u32, fresnel: impl Fn(f32) -> Vec3) -> Vec3 {
     let mut sum = glam::DVec3::ZERO;
     for u in grid(points) {
         let incident = ggx_sample(outgoing, width, u);
@@ -90,10 +89,10 @@ fn cover_tables(weight: f32, albedo: impl Fn(Vec3) -> f32 + Sync) -> [Vec<f32>; 
 
 /// Words of a plastic: directional albedo of the coat, transmission into and out of the base,
 /// probability of sampling the coat; see `COAT_TRANSMISSION_OFFSET` and `PLASTIC_SPECULAR_SHARE_OFFSET`.
-pub(crate) fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
+pub(crate) fn plastic_words(diffuse: Vec3, width: GgxWidth, ior: f32) -> Vec<u32> {
     let fresnel = |cosine| Vec3::splat(fresnel_dielectric(cosine, ior));
     let [coat, transmission] =
-        cover_tables(1.0, |direction| ggx_albedo(direction, alpha, FINE_POINTS, fresnel).x);
+        cover_tables(1.0, |direction| ggx_albedo(direction, width, FINE_POINTS, fresnel).x);
     let specular_share = coat.iter().map(|&e| {
         let base = luminance(diffuse) * (1.0 - e);
         if e + base > 0.0 { e / (e + base) } else { 0.5 }
@@ -104,7 +103,8 @@ pub(crate) fn plastic_words(diffuse: Vec3, alpha: f32, ior: f32) -> Vec<u32> {
 /// Words of the coat of a principled material: the first two tables of a plastic.
 pub(crate) fn coat_words(weight: f32, alpha: f32) -> Vec<u32> {
     let fresnel = |cosine| Vec3::splat(mix(COAT_REFLECTANCE, 1.0, schlick_rise(cosine)));
-    let albedo = |direction| ggx_albedo(direction, alpha, FINE_POINTS, fresnel).x;
+    let width = GgxWidth::round(alpha);
+    let albedo = |direction| ggx_albedo(direction, width, FINE_POINTS, fresnel).x;
     cover_tables(weight, albedo).concat().into_iter().map(f32::to_bits).collect()
 }
 
@@ -121,46 +121,50 @@ pub(crate) fn sheen_words(strength: f32, alpha: f32) -> Vec<u32> {
 }
 
 /// Words of a conductor with exact Fresnel: directional albedo without the factor of reflected light.
-pub(crate) fn conductor_words(alpha: f32, eta: Vec3, k: Vec3) -> Vec<u32> {
+pub(crate) fn conductor_words(width: GgxWidth, eta: Vec3, k: Vec3) -> Vec<u32> {
     let fresnel = |cosine: f32| fresnel_conductor(cosine, eta, k);
     (0..BRDF_COSINE_NODES)
         .into_par_iter()
         .flat_map_iter(|node| {
-            let albedo = ggx_albedo(direction_at(node as f32), alpha, FINE_POINTS, fresnel);
+            let albedo = ggx_albedo(direction_at(node as f32), width, FINE_POINTS, fresnel);
             albedo.clamp(Vec3::ZERO, Vec3::ONE).to_array()
         })
         .map(f32::to_bits)
         .collect()
 }
 
-/// Words of the table that all GGX surfaces with a Schlick reflectance share.
+/// Words of the table that all surfaces of one distribution with a Schlick reflectance share.
 pub(crate) const GGX_WORDS: usize = (DIFFUSE_RISE_OFFSET + BRDF_COSINE_NODES) as usize;
 
-/// Albedo of GGX by roughness and cosine as factors of the reflectance at normal and at grazing
-/// incidence, and the mean rise of Schlick's reflectance over a diffuse base; see
-/// `GGX_ROUGHNESS_WORDS` and `DIFFUSE_RISE_OFFSET`. Computed once a process, by one
-/// thread: one that waits for others in here could be given work that waits for it.
-pub(crate) fn ggx_words() -> &'static [u32] {
-    static WORDS: LazyLock<Vec<u32>> = LazyLock::new(|| {
-        let nodes = (GGX_ROUGHNESS_INTERVALS + 1) * BRDF_COSINE_NODES;
-        let ggx: Vec<[f32; 2]> = (0..nodes)
-            .map(|index| {
-                let (row, node) = (index / BRDF_COSINE_NODES, index % BRDF_COSINE_NODES);
-                let roughness = row as f32 / GGX_ROUGHNESS_INTERVALS as f32;
-                let alpha = (roughness * roughness).max(SMALLEST_ALPHA);
-                let direction = direction_at(node as f32);
-                let fresnel = |cosine: f32| {
-                    let rise = schlick_rise(cosine);
-                    vec3(1.0 - rise, rise, 0.0)
-                };
-                let factors = ggx_albedo(direction, alpha, COARSE_POINTS, fresnel);
-                [factors.x, factors.y]
-            })
-            .collect();
-        let rise = (0..BRDF_COSINE_NODES).map(|node| diffuse_rise(direction_at(node as f32)));
-        ggx.into_iter().flatten().chain(rise).map(f32::to_bits).collect()
-    });
-    &WORDS
+/// Albedo of GGX, or of Beckmann's normals, by roughness and cosine as factors of the reflectance at normal
+/// and at grazing incidence, and the mean rise of Schlick's reflectance over a diffuse base; see
+/// `GGX_ROUGHNESS_WORDS` and `DIFFUSE_RISE_OFFSET`. Computed once a process, by one thread: one that
+/// waits for others in here could be given work that waits for it.
+pub(crate) fn ggx_words(is_beckmann: bool) -> &'static [u32] {
+    static GGX: LazyLock<Vec<u32>> = LazyLock::new(|| schlick_words(false));
+    static BECKMANN: LazyLock<Vec<u32>> = LazyLock::new(|| schlick_words(true));
+    if is_beckmann { &BECKMANN } else { &GGX }
+}
+
+fn schlick_words(is_beckmann: bool) -> Vec<u32> {
+    let nodes = (GGX_ROUGHNESS_INTERVALS + 1) * BRDF_COSINE_NODES;
+    let ggx: Vec<[f32; 2]> = (0..nodes)
+        .map(|index| {
+            let (row, node) = (index / BRDF_COSINE_NODES, index % BRDF_COSINE_NODES);
+            let roughness = row as f32 / GGX_ROUGHNESS_INTERVALS as f32;
+            let alpha = (roughness * roughness).max(SMALLEST_ALPHA);
+            let direction = direction_at(node as f32);
+            let fresnel = |cosine: f32| {
+                let rise = schlick_rise(cosine);
+                vec3(1.0 - rise, rise, 0.0)
+            };
+            let width = GgxWidth { is_beckmann, ..GgxWidth::round(alpha) };
+            let factors = ggx_albedo(direction, width, COARSE_POINTS, fresnel);
+            [factors.x, factors.y]
+        })
+        .collect();
+    let rise = (0..BRDF_COSINE_NODES).map(|node| diffuse_rise(direction_at(node as f32)));
+    ggx.into_iter().flatten().chain(rise).map(f32::to_bits).collect()
 }
 
 /// Mean of Schlick's rise over incident directions in proportion to their cosine.

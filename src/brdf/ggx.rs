@@ -1,11 +1,15 @@
-//! Twin of `glsl/include/ggx.glsl`: same names, same order. GGX microfacets: density of normals,
-//! masking, reflection, sampling. Densities are per steradian of incident directions unless stated.
+//! Twin of `glsl/include/ggx.glsl`: same names, same order. GGX microfacets: density of normals, masking,
+//! reflection, sampling; Beckmann's, drawn as if GGX's. Densities are per steradian of incident directions
+//! unless stated.
 
 use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, vec2, vec3};
 
-use crate::shader::structs::Material;
+use crate::shader::{
+    constants::{MATERIAL_COATED, MATERIAL_SHEEN},
+    structs::Material,
+};
 
 /// Smallest GGX width: single-precision directions cannot resolve a narrower lobe.
 pub(crate) const SMALLEST_ALPHA: f32 = 1e-3;
@@ -19,23 +23,41 @@ pub struct GgxWidth {
     pub alpha: f32,
     /// Entries (p, q), of a length below 1.
     pub anisotropy: Vec2,
+    /// True if the normals are Beckmann's.
+    pub is_beckmann: bool,
 }
 
 impl GgxWidth {
     /// The same in all directions.
     pub fn round(alpha: f32) -> Self {
-        Self { alpha, anisotropy: Vec2::ZERO }
+        Self { alpha, anisotropy: Vec2::ZERO, is_beckmann: false }
     }
 
     /// That of a material's main lobe.
     pub fn of(material: &Material) -> Self {
-        Self { alpha: material.alpha, anisotropy: material.anisotropy.into() }
+        let is_covered = matches!(material.kind, MATERIAL_COATED | MATERIAL_SHEEN);
+        Self {
+            alpha: material.alpha,
+            anisotropy: material.anisotropy.into(),
+            is_beckmann: !is_covered && material.cover_alpha > 0.0,
+        }
     }
 
     /// M times a vector.
     fn turned(self, tangential: Vec2) -> Vec2 {
         let Vec2 { x: p, y: q } = self.anisotropy;
         vec2(self.anisotropy.dot(tangential), q * tangential.x - p * tangential.y)
+    }
+
+    /// Determinant of I + M, whose inverse is (I − M) over it.
+    fn area(self) -> f32 {
+        1.0 - self.anisotropy.dot(self.anisotropy)
+    }
+
+    /// Square of a half vector's tangential part before the surface of equal widths α was stretched to this.
+    fn narrowed(self, half_vector: Vec3) -> f32 {
+        let tangential = half_vector.truncate();
+        ((tangential - self.turned(tangential)) / self.area()).length_squared()
     }
 
     /// Stretches a direction as the surface of width 1 is.
@@ -48,19 +70,41 @@ impl GgxWidth {
 /// Density of GGX normals, per steradian, for a half vector of any length. \[Walter et al. 2007\]
 /// Eq. 33, without the cancellation in 1 − cos²θ, which matters for α below 0.01; \[Heitz 2014\] Eq. 85.
 pub fn ggx_normal_density(half_vector: Vec3, width: GgxWidth) -> f32 {
-    let tangential = half_vector.truncate();
     let normal = half_vector.z * half_vector.z;
-    let squared = tangential.dot(tangential) + normal;
-    // Determinant of I + M, whose inverse is (I − M) over it.
-    let area = 1.0 - width.anisotropy.dot(width.anisotropy);
-    let narrowed = (tangential - width.turned(tangential)) / area;
-    let ratio = squared / (narrowed.dot(narrowed) + width.alpha * width.alpha * normal);
-    width.alpha * width.alpha * ratio * ratio / (PI * area)
+    let ratio = half_vector.length_squared()
+        / (width.narrowed(half_vector) + width.alpha * width.alpha * normal);
+    width.alpha * width.alpha * ratio * ratio / (PI * width.area())
+}
+
+/// Density of Beckmann's normals over that of GGX of the same width, (1 + s)² e^−s ≤ 4/e for the squared
+/// slope s in units of the width. \[Walter et al. 2007\] Eq. 25.
+pub fn beckmann_ratio(half_vector: Vec3, width: GgxWidth) -> f32 {
+    let wide = width.alpha * width.alpha * half_vector.z * half_vector.z;
+    let slope = (width.narrowed(half_vector) / wide.max(1e-30)).min(80.0);
+    (1.0 + slope) * (1.0 + slope) * (-slope).exp()
+}
+
+/// Density of the normals of the width's distribution.
+pub fn normal_density(half_vector: Vec3, width: GgxWidth) -> f32 {
+    let density = ggx_normal_density(half_vector, width);
+    if width.is_beckmann { density * beckmann_ratio(half_vector, width) } else { density }
 }
 
 /// Length of the direction after stretching the surface to α = 1: √(cos²θ + α² sin²θ).
 pub fn ggx_stretched_length(direction: Vec3, width: GgxWidth) -> f32 {
     width.stretched(direction).length()
+}
+
+/// |cosθ| (1 + 2Λ) of the width's distribution, by which it masks: GGX's is the stretched length. \[Walter et
+/// al. 2007\], the fit below Eq. 27.
+pub fn masked_length(direction: Vec3, width: GgxWidth) -> f32 {
+    if !width.is_beckmann {
+        return ggx_stretched_length(direction, width);
+    }
+    let cosine = direction.z.abs();
+    let a = cosine / width.stretched(direction).truncate().length().max(1e-30);
+    let masked = (1.0 - 1.259 * a + 0.396 * a * a) / (3.535 * a + 2.181 * a * a);
+    if a < 1.6 { cosine + 2.0 * cosine * masked } else { cosine }
 }
 
 /// Lower end of the spherical cap of bounded sampling, as a factor. \[Eto & Tokuyoshi 2023\] Eq. 5.
@@ -81,9 +125,9 @@ pub(crate) fn ggx_reflection(
     incident_local: Vec3,
     width: GgxWidth,
 ) -> f32 {
-    let masking = incident_local.z * ggx_stretched_length(outgoing_local, width)
-        + outgoing_local.z * ggx_stretched_length(incident_local, width);
-    0.5 * ggx_normal_density(half_vector, width) / masking
+    let masking = incident_local.z * masked_length(outgoing_local, width)
+        + outgoing_local.z * masked_length(incident_local, width);
+    0.5 * normal_density(half_vector, width) / masking
 }
 
 /// Density of [`ggx_sample`]. \[Eto & Tokuyoshi 2023\] Eq. 8 with the Jacobian of the reflection.

@@ -7,12 +7,12 @@ use glam::{Vec2, Vec3};
 use crate::{
     brdf::{
         albedo::{GGX_WORDS, coat_words, conductor_words, ggx_words, plastic_words, sheen_words},
-        ggx::SMALLEST_ALPHA,
+        ggx::{GgxWidth, SMALLEST_ALPHA},
         sheen::SMALLEST_SHEEN_ALPHA,
     },
     error::{Error, Result},
     math::colour::luminance,
-    scene::material::{ConductorFresnel, Material, MaterialKind},
+    scene::material::{ConductorFresnel, Distribution, Material, MaterialKind},
     shader::{constants::*, structs},
 };
 
@@ -36,13 +36,17 @@ impl MaterialTables {
         check_size(materials)?;
         let mut tables = Self { materials: Vec::with_capacity(materials.len()), words: vec![0] };
         let mut measured_offsets = HashMap::new();
-        let mut ggx_offset = None;
-        // All GGX surfaces with a Schlick reflectance share one table.
-        let mut ggx_table =
-            |tables: &mut Self| *ggx_offset.get_or_insert_with(|| tables.append(ggx_words()));
+        let mut ggx_offsets = [None; 2];
+        // All surfaces of one distribution with a Schlick reflectance share one table.
+        let mut ggx_table = |tables: &mut Self, is_beckmann: bool| {
+            *ggx_offsets[usize::from(is_beckmann)]
+                .get_or_insert_with(|| tables.append(ggx_words(is_beckmann)))
+        };
         for material in materials {
             let mut converted = structs::Material::default();
             let anisotropy = &material.surface.anisotropy;
+            let is_beckmann = material.surface.distribution == Distribution::Beckmann;
+            let round = |alpha| GgxWidth { is_beckmann, ..GgxWidth::round(alpha) };
             let widths = |converted: &mut structs::Material, alpha: f32| {
                 let [along, across] = anisotropy.widths(alpha.max(SMALLEST_ALPHA));
                 converted.alpha = anisotropy.mean_width(across);
@@ -74,23 +78,25 @@ impl MaterialTables {
                     converted.reflectance = diffuse.to_array();
                     converted.alpha = alpha.max(SMALLEST_ALPHA);
                     converted.ior = *ior;
-                    let words = plastic_words(*diffuse, converted.alpha, *ior);
+                    converted.cover_alpha = f32::from(is_beckmann);
+                    let words = plastic_words(*diffuse, round(converted.alpha), *ior);
                     converted.table_offset = tables.append(&words);
                 }
                 MaterialKind::Conductor { alpha, fresnel } => {
                     converted.kind = MATERIAL_CONDUCTOR;
                     widths(&mut converted, *alpha);
+                    converted.cover_alpha = f32::from(is_beckmann);
                     match fresnel {
                         ConductorFresnel::Schlick { reflectance } => {
                             converted.reflectance = reflectance.to_array();
-                            converted.table_offset = ggx_table(&mut tables);
+                            converted.table_offset = ggx_table(&mut tables, is_beckmann);
                         }
                         ConductorFresnel::Exact { reflectance, eta, k } => {
                             converted.ior = 1.0;
                             converted.reflectance = reflectance.to_array();
                             converted.eta = eta.to_array();
                             converted.k = k.to_array();
-                            let words = conductor_words(converted.alpha, *eta, *k);
+                            let words = conductor_words(round(converted.alpha), *eta, *k);
                             converted.table_offset = tables.append(&words);
                         }
                     }
@@ -106,7 +112,7 @@ impl MaterialTables {
                         .map(|reflectance| reflectance * own.specular)
                         .to_array();
                     converted.k = [own.specular; 3];
-                    converted.table_offset = ggx_table(&mut tables);
+                    converted.table_offset = ggx_table(&mut tables, false);
                     if own.coat_weight > 0.0 {
                         converted.kind = MATERIAL_COATED;
                         converted.cover = [own.coat_weight; 3];
@@ -130,6 +136,7 @@ impl MaterialTables {
                 }
                 MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption } => {
                     converted.kind = MATERIAL_DIELECTRIC;
+                    converted.cover_alpha = f32::from(is_beckmann);
                     converted.alpha = if *alpha > 0.0 { alpha.max(SMALLEST_ALPHA) } else { 0.0 };
                     converted.ior = *ior;
                     converted.reflectance = reflectance.to_array();
@@ -169,8 +176,8 @@ impl MaterialTables {
 
 /// Fails if the measured tables do not fit into one buffer.
 fn check_size(materials: &[Material]) -> Result<()> {
-    // Count the table that GGX surfaces share, and the word that is always there.
-    let mut bytes = (GGX_WORDS + 1) * 4;
+    // Count the tables that surfaces of one distribution share, and the word that is always there.
+    let mut bytes = (2 * GGX_WORDS + 1) * 4;
     let mut seen = Vec::new();
     let mut names = Vec::new();
     for material in materials {

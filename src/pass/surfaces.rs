@@ -2,11 +2,11 @@
 
 use super::texture_buffers::TextureAccess;
 use crate::{
-    scene::material::{Material, MaterialKind},
+    scene::material::{Distribution, Material, MaterialKind},
     shader::constants::{
         CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, SPECULAR_KINDS, SURFACES_ANISOTROPIC,
-        SURFACES_EMITTING, SURFACES_ONE_SIDED, SURFACES_PASSING, SURFACES_SPECULAR,
-        SURFACES_TEXTURED, SURFACES_TINTED_PANES,
+        SURFACES_BECKMANN, SURFACES_EMITTING, SURFACES_ONE_SIDED, SURFACES_PASSING,
+        SURFACES_SPECULAR, SURFACES_TEXTURED, SURFACES_TINTED_PANES,
     },
 };
 
@@ -71,6 +71,7 @@ fn features_of(material: &Material) -> u32 {
         (SURFACES_TEXTURED, is_textured),
         (SURFACES_ANISOTROPIC, is_anisotropic),
         (SURFACES_TINTED_PANES, is_pane && is_tinted),
+        (SURFACES_BECKMANN, surface.distribution == Distribution::Beckmann),
         (SURFACES_EMITTING, surface.emission.is_some()),
     ]
     .into_iter()

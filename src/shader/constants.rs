@@ -152,6 +152,8 @@ constants! {
     SURFACES_ANISOTROPIC = 128;
     /// Textures or vertex colours tint some thin panes.
     SURFACES_TINTED_PANES = 256;
+    /// Some normals of microfacets are Beckmann's.
+    SURFACES_BECKMANN = 512;
 
     // Dimensions of random numbers that the host draws too.
     /// First dimension of the first vertex of a path.

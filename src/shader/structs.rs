@@ -412,7 +412,7 @@ structs! {
         k: vec3,
         /// Share of a principled material that a coat covers, in all channels, or colour of its sheen.
         cover: vec3,
-        /// Width α of the coat or the sheen.
+        /// Width α of the coat or the sheen; without these, 1 selects Beckmann's normals, 0 GGX.
         cover_alpha: float,
         /// First word of the table of coat or sheen in the BRDF table buffer.
         cover_table: uint,

@@ -11,7 +11,9 @@ use fenestra::{
     brdf::{self, MaterialTables},
     math::random::hash_4d,
     scene::{
-        material::{Anisotropy, ConductorFresnel, Material, MaterialKind, Principled},
+        material::{
+            Anisotropy, ConductorFresnel, Distribution, Material, MaterialKind, Principled,
+        },
         measured::MeasuredTable,
     },
     shader::structs,
@@ -63,6 +65,12 @@ fn cloth(base_color: Vec3, specular: f32, sheen_color: Vec3, sheen_roughness: f3
 /// A case whose highlights are stretched: strength, and angle from the tangent in radians.
 fn brushed(mut case: Case, strength: f32, rotation: f32) -> Case {
     case.material.surface.anisotropy = Anisotropy { strength, rotation, direction: None };
+    case
+}
+
+/// A case with Beckmann's normals.
+fn beckmann(mut case: Case) -> Case {
+    case.material.surface.distribution = Distribution::Beckmann;
     case
 }
 
@@ -165,6 +173,21 @@ pub fn cases() -> &'static [Case] {
                     transmittance: 0.75 * vec3(0.8, 0.5, 0.2),
                 },
             ),
+            beckmann(case("white plastic of Beckmann's", 0.4, plastic(Vec3::ONE, 0.4, 1.5))),
+            beckmann(brushed(
+                case(
+                    "gold of Beckmann's",
+                    0.1,
+                    MaterialKind::Conductor { alpha: 0.1, fresnel: GOLD },
+                ),
+                0.5,
+                0.6,
+            )),
+            beckmann(case(
+                "metal of Beckmann's",
+                0.3,
+                MaterialKind::Conductor { alpha: 0.3, fresnel: grey },
+            )),
         ]
     })
 }
@@ -180,9 +203,9 @@ pub fn tables() -> &'static MaterialTables {
 
 /// Returns every kind at which no light is sampled: tinted and not, smooth and rough, of indices above
 /// and below 1.
-pub fn specular_kinds() -> [MaterialKind; 8] {
+pub fn specular_materials() -> Vec<Material> {
     let tint = vec3(0.9, 0.6, 0.3);
-    [
+    let kinds = [
         MaterialKind::Mirror { reflectance: tint },
         MaterialKind::glass(1.5, 0.0),
         MaterialKind::glass(1.5, 0.2),
@@ -197,16 +220,16 @@ pub fn specular_kinds() -> [MaterialKind; 8] {
             absorption: 2.0 * tint,
         },
         MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: tint },
-    ]
+    ];
+    let glass = beckmann(case("specular", 0.4, MaterialKind::glass(1.5, 0.4)));
+    let all = kinds.map(|kind| Material::new("specular", kind)).into_iter();
+    all.chain([glass.material]).collect()
 }
 
-/// Returns the device's materials of [`specular_kinds`].
+/// Returns the device's materials of [`specular_materials`].
 pub fn specular() -> &'static [structs::Material] {
     static MATERIALS: OnceLock<Vec<structs::Material>> = OnceLock::new();
-    MATERIALS.get_or_init(|| {
-        let materials = specular_kinds().map(|kind| Material::new("specular", kind));
-        MaterialTables::new(&materials).unwrap().materials
-    })
+    MATERIALS.get_or_init(|| MaterialTables::new(&specular_materials()).unwrap().materials)
 }
 
 /// Returns three reproducible numbers in [0, 1).

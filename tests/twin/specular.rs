@@ -20,20 +20,24 @@ use glam::{Vec3, vec2, vec3};
 
 /// Density of all visible normals, per steradian, over the cosine of outgoing direction and normal:
 /// G₁·D/cosθ_o. \[Heitz 2014\] Eq. 21.
-fn ggx_visible_density(normal: Vec3, outgoing_local: Vec3, alpha: f32) -> f32 {
-    let width = GgxWidth::round(alpha);
+fn ggx_visible_density(normal: Vec3, outgoing_local: Vec3, width: GgxWidth) -> f32 {
     2.0 * ggx_normal_density(normal, width)
         / (outgoing_local.z + ggx_stretched_length(outgoing_local, width))
 }
 
-/// G₂ of both directions over G₁ of the outgoing one; height-correlated on one side, and the same
-/// expression where the other direction is below the surface. 0…1.
-fn ggx_masking_ratio(outgoing_local: Vec3, incident_local: Vec3, alpha: f32) -> f32 {
+/// D·G₂ of both directions over GGX's D·G₁ of the outgoing one; height-correlated on one side, and the same
+/// expression where the other direction is below the surface. 0…1 for GGX.
+fn visible_normal_ratio(
+    normal: Vec3,
+    outgoing_local: Vec3,
+    incident_local: Vec3,
+    width: GgxWidth,
+) -> f32 {
     let cosine = incident_local.z.abs();
-    let width = GgxWidth::round(alpha);
-    let stretched = ggx_stretched_length(outgoing_local, width);
-    (outgoing_local.z + stretched) * cosine
-        / (stretched * cosine + outgoing_local.z * ggx_stretched_length(incident_local, width))
+    let visible = (outgoing_local.z + ggx_stretched_length(outgoing_local, width)) * cosine
+        / (masked_length(outgoing_local, width) * cosine
+            + outgoing_local.z * masked_length(incident_local, width));
+    if width.is_beckmann { visible * beckmann_ratio(normal, width) } else { visible }
 }
 
 /// Continuation of a path; a weight of 0 ends it.
@@ -65,7 +69,7 @@ fn refracted(outgoing_local: Vec3, normal: Vec3, eta: f32) -> Vec3 {
     (cosine / eta - refracted_cosine(cosine, eta)) * normal - outgoing_local / eta
 }
 
-/// Interface of a dielectric: smooth at alpha = 0, else GGX by visible normals. \[Walter et al. 2007\].
+/// Interface of a dielectric: smooth at alpha = 0, else by GGX's visible normals. \[Walter et al. 2007\].
 fn dielectric_scatter(
     material: &Material,
     outgoing_local: Vec3,
@@ -74,9 +78,9 @@ fn dielectric_scatter(
 ) -> Scatter {
     let eta = relative_index(material, is_back);
     let mut normal = Vec3::Z;
+    let width = GgxWidth::of(material);
     if material.alpha > 0.0 {
-        normal =
-            ggx_normal_sample(outgoing_local, GgxWidth::round(material.alpha), 1.0, vec2(u.y, u.z));
+        normal = ggx_normal_sample(outgoing_local, width, 1.0, vec2(u.y, u.z));
     }
     let cosine = outgoing_local.dot(normal);
     let fresnel = fresnel_interface(cosine, eta);
@@ -94,7 +98,7 @@ fn dielectric_scatter(
         )
     };
     if material.alpha > 0.0 {
-        weight *= ggx_masking_ratio(outgoing_local, direction_local, material.alpha);
+        weight *= visible_normal_ratio(normal, outgoing_local, direction_local, width);
     }
     // A normal may send light to the wrong side of the surface: no sample.
     if cosine <= 0.0 || (direction_local.z < 0.0) != is_transmitted {
@@ -124,9 +128,10 @@ pub fn dielectric_evaluate_and_pdf(
     }
     let fresnel = fresnel_interface(cosine, eta);
     let probability = reflection_probability(material, fresnel);
-    let density = ggx_visible_density(normal, outgoing_local, material.alpha);
+    let width = GgxWidth::of(material);
+    let density = ggx_visible_density(normal, outgoing_local, width);
     // G₂·D / (cos o · cos i), by the density of visible normals.
-    let ratio = ggx_masking_ratio(outgoing_local, incident_local, material.alpha) * density
+    let ratio = visible_normal_ratio(normal, outgoing_local, incident_local, width) * density
         / incident_local.z.abs();
     if is_transmitted {
         let jacobian = cosine * incident_cosine.abs() / half_vector.dot(half_vector);

@@ -3,6 +3,8 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::material::Distribution;
+
 /// Refractive indices that a coat may have.
 pub(crate) const COAT_IOR: (f32, f32) = (1.01, 4.0);
 /// Reflectance at normal incidence of the dielectric of refractive index 1.5.
@@ -72,17 +74,19 @@ impl LossyCoat {
     /// Elevations at which Mitsuba tabulates its coat.
     const ELEVATIONS: u32 = 32;
 
-    /// Coat of GGX microfacets of width `alpha` and refractive index `ior` > 1.
-    pub(crate) fn new(alpha: f32, ior: f32) -> Self {
+    /// Coat of microfacets of width `alpha` and refractive index `ior` > 1.
+    pub(crate) fn new(distribution: Distribution, alpha: f32, ior: f32) -> Self {
+        let microfacets =
+            |ior, cosine, reflects| microfacets(distribution, alpha, ior, cosine, reflects);
         // The means of Mitsuba's tables over equal steps of the cosine.
         let mean = |of: &dyn Fn(f32) -> f32| {
             let cosine = |step: u32| (step as f32 / (Self::ELEVATIONS - 1) as f32).max(1e-6);
             let sum: f32 = (0..Self::ELEVATIONS).map(|step| cosine(step) * of(cosine(step))).sum();
             2.0 * sum / Self::ELEVATIONS as f32
         };
-        let inside = mean(&|cosine| microfacets(alpha, ior.recip(), cosine, true));
-        let through = mean(&|cosine| microfacets(alpha, ior, cosine, false));
-        let reflected = mean(&|cosine| microfacets(alpha, ior, cosine, true));
+        let inside = mean(&|cosine| microfacets(ior.recip(), cosine, true));
+        let through = mean(&|cosine| microfacets(ior, cosine, false));
+        let reflected = mean(&|cosine| microfacets(ior, cosine, true));
         Self { shown: through * through / (ior * ior * (1.0 - reflected)), inside }
     }
 
@@ -102,19 +106,37 @@ impl LossyCoat {
     }
 }
 
-/// Share of light at an elevation that GGX microfacets reflect or refract to where others do not mask it.
-fn microfacets(alpha: f32, ior: f32, cosine: f32, reflects: bool) -> f32 {
+/// Share of light at an elevation that microfacets reflect or refract to where others do not mask it.
+fn microfacets(
+    distribution: Distribution,
+    alpha: f32,
+    ior: f32,
+    cosine: f32,
+    reflects: bool,
+) -> f32 {
     const STEPS: u32 = 24;
     let to = Vec3::new((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
     let seen = |direction: Vec3| {
         let tangent = alpha * direction.truncate().length() / direction.z.abs().max(1e-6);
-        2.0 / (1.0 + (1.0 + tangent * tangent).sqrt())
+        let a = tangent.recip();
+        match distribution {
+            Distribution::Ggx => 2.0 / (1.0 + (1.0 + tangent * tangent).sqrt()),
+            // [Walter et al. 2007], the fit below Eq. 27.
+            Distribution::Beckmann if a < 1.6 => {
+                (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a)
+            }
+            Distribution::Beckmann => 1.0,
+        }
     };
     let share = |index: u32| {
         let [polar, turn] =
             [index / STEPS, index % STEPS].map(|step| (step as f32 + 0.5) / STEPS as f32);
         // Steps crowd toward the steep facets, which count most.
-        let (below, density) = ((1.0 - polar).powi(3), 3.0 * (1.0 - polar).powi(2));
+        let (below, mut density) = ((1.0 - polar).powi(3), 3.0 * (1.0 - polar).powi(2));
+        if distribution == Distribution::Beckmann {
+            // Over the density of GGX, by which the points are spread.
+            density *= (1.0 - below.recip()).exp() / (below * below);
+        }
         let normal_z = (1.0 + alpha * alpha * (1.0 - below) / below).sqrt().recip();
         let sine = (1.0 - normal_z * normal_z).max(0.0).sqrt();
         let way = Vec2::from_angle(std::f32::consts::TAU * turn);
@@ -136,7 +158,7 @@ fn microfacets(alpha: f32, ior: f32, cosine: f32, reflects: bool) -> f32 {
             let away = (met / ior - refracted.max(0.0).sqrt()) * normal - to / ior;
             (away, 1.0 - fresnel, away.z < 0.0)
         };
-        // Points are spread as D cosθ; the visible ones have the density G₁ D (o · m)/o_z.
+        // Facets have the density D cosθ; the visible ones G₁ D (o · m)/o_z.
         if !is_kept {
             return 0.0;
         }

@@ -168,7 +168,7 @@ features! {
     MI_BLEND "the lesser part of `blendbsdf` and `mixturebsdf` with glass or a sheet"
         "the other one is the whole surface";
     MI_BUMP_MAP "`bumpmap` of vertex colours, or beside a `normalmap`" "left out";
-    MI_BECKMANN "distribution `beckmann`" "`ggx` of the same α";
+    MI_DISTRIBUTION "distributions `phong`, `as`; `beckmann` on coated metal" "`beckmann`; `ggx`";
     MI_ANISOTROPIC "`alpha_u` and `alpha_v` of plastic and glass, or images that differ"
         "their mean, or the image of `alpha_u`";
     MI_ALPHA_TEXTURE "`alpha` of vertices" "0.1";

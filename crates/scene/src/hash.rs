@@ -9,7 +9,7 @@ use crate::{
     files::hexadecimal,
     instance::Instance,
     lamp::LampKind,
-    material::{Anisotropy, MaterialKind, Surface},
+    material::{Anisotropy, Distribution, MaterialKind, Surface},
     texture::{Texels, TextureUse},
 };
 
@@ -65,6 +65,8 @@ const PORTAL_TAG: u32 = 3;
 const LIGHT_GROUP_TAG: u32 = 4;
 /// Follows that of light groups.
 const ANISOTROPY_TAG: u32 = 5;
+/// Marks the hash of a surface with Beckmann's normals.
+const BECKMANN_TAG: u32 = 6;
 
 struct Hasher(Sha256);
 
@@ -171,6 +173,9 @@ impl Hasher {
             self.array(&[ANISOTROPY_TAG]);
             self.array(&[*strength, *rotation]);
             self.texture(direction.as_ref());
+        }
+        if surface.distribution == Distribution::Beckmann {
+            self.array(&[BECKMANN_TAG]);
         }
         self.light_group(surface.light_group.as_deref());
     }

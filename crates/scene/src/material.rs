@@ -3,6 +3,7 @@
 use std::{f32::consts::FRAC_PI_2, path::PathBuf, sync::Arc};
 
 use glam::Vec3;
+use serde::Deserialize;
 
 use crate::{math::colour::luminance, measured::MeasuredTable, texture::TextureUse};
 
@@ -55,6 +56,8 @@ pub struct Surface {
     pub metallic: Option<TextureUse>,
     /// Stretch of the highlights of a conductor or a principled material.
     pub anisotropy: Anisotropy,
+    /// Normals of the microfacets of a conductor, a plastic or a dielectric.
+    pub distribution: Distribution,
     /// Normals in the tangent frame, n = 2 · texel − 1, linear.
     pub normal: Option<TextureUse>,
     /// Factor of the tangential components of `normal`.
@@ -77,6 +80,7 @@ impl Default for Surface {
             roughness: None,
             metallic: None,
             anisotropy: Anisotropy::default(),
+            distribution: Distribution::Ggx,
             normal: None,
             normal_scale: 1.0,
             opacity: Opacity::default(),
@@ -111,6 +115,17 @@ impl Surface {
     pub(crate) fn reads_uvs(&self) -> bool {
         self.tangent_uv_set().is_some() || self.textures().next().is_some()
     }
+}
+
+/// Distribution of the normals of microfacets, of a width α.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Distribution {
+    /// \[Walter et al. 2007\] Eq. 33.
+    #[default]
+    Ggx,
+    /// Eq. 25 there, which has no long tails.
+    Beckmann,
 }
 
 /// Widths of GGX that differ by direction, as `KHR_materials_anisotropy` has them: the material's is the

@@ -15,7 +15,9 @@ use fenestra_scene::{
     lamp::{LampKind, Spot, SpotFalloff},
     light_group::LightGroups,
     load::{Arrays, LoadOptions},
-    material::{Anisotropy, ConductorFresnel, Emission, MaterialKind, Principled, Surface},
+    material::{
+        Anisotropy, ConductorFresnel, Distribution, Emission, MaterialKind, Principled, Surface,
+    },
     mesh::Mesh,
     picture::{Image, RgbImage},
     still_hash,
@@ -295,13 +297,17 @@ fn text_that_is_no_scene_is_refused_with_line_and_column() {
     case(
         &HEAD.replace("reflectance", "color"),
         "room.toml:13:1: unknown key `color` in material `grey` of type `diffuse`, expected one \
-         of `name`, `type`, `normal`, `anisotropy`, `anisotropy_rotate_deg`, `opacity`, \
+         of `name`, `type`, `normal`, `anisotropy`, `anisotropy_rotate_deg`, `distribution`, `opacity`, \
          `opacity_cutoff`, `emission`, `emission_two_sided`, `two_sided`, `vertex_color`, `reflectance`",
     );
     let both = "\"principled\"\nbase_color = [1, 1, 1]\nroughness = 1\ncoat_weight = 1\n\
                 sheen_color = [1, 0, 0]";
     let covered = HEAD.replace("reflectance = [0.5, 0.5, 0.5]", "").replace("\"diffuse\"", both);
     case(&covered, "material `grey` (line 10): expected a coat or a sheen, found both");
+    case(
+        &HEAD.replace("reflectance", "distribution = \"beckmann\"\nreflectance"),
+        "distribution is for conductor, plastic and dielectric materials",
+    );
     case(
         &HEAD.replace("reflectance", "anisotropy = 0.5\nreflectance"),
         "anisotropy is for conductor and principled materials",
@@ -540,6 +546,7 @@ fn materials_take_textures_opacity_and_emission() {
         [[material]]
         name = \"steel\"
         type = \"conductor\"
+        distribution = \"beckmann\"
         reflectance = [0.5, 0.5, 0.6]
         roughness = {{ texture = \"wood.png\", factor = 0.5 }}"
     );
@@ -584,6 +591,7 @@ fn materials_take_textures_opacity_and_emission() {
     let MaterialKind::ThinDielectric { ior, transmittance, .. } = pane.kind else { unreachable!() };
     assert_eq!((ior, transmittance), (1.5, Vec3::new(0.9, 0.8, 0.7)));
     assert_eq!(pane.surface.color.as_ref().unwrap().encoding, Encoding::Srgb);
+    assert_eq!(steel.surface.distribution, Distribution::Beckmann);
     assert!(matches!(silver.kind, MaterialKind::Mirror { reflectance: Vec3::ONE }));
     let emission = silver.surface.emission.as_ref().unwrap();
     assert_eq!(emission.radiance, Vec3::new(10.0, 20.0, 30.0));
@@ -1117,8 +1125,9 @@ fn the_hash_follows_every_part_of_surfaces_and_lights() {
         let place = Transform::new([width, 1.0, 1.0], [0.0; 3], [0.0; 3]);
         scene.geometry.instances.push(Instance::new(0, &place, 0, replaces).unwrap());
     }
-    let changes: [fn(&mut Scene); 24] = [
+    let changes: [fn(&mut Scene); 25] = [
         |_| (),
+        |scene| surface(scene).distribution = Distribution::Beckmann,
         |scene| stretched(scene, 0.0, None),
         |scene| stretched(scene, 0.5, None),
         |scene| {

@@ -76,7 +76,11 @@ impl Fits {
         let means: Vec<_> = scene
             .materials
             .iter()
-            .map(|material| Material::new(&material.name, material.mean_kind()))
+            .map(|material| {
+                let mut mean = Material::new(&material.name, material.mean_kind());
+                mean.surface.distribution = material.surface.distribution;
+                mean
+            })
             .collect();
         let tables = MaterialTables::new(&means)?;
         let options = BrdfOptions {

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     coat::normal_reflectance,
-    material::{Material, MaterialKind, Principled, Surface},
+    material::{Distribution, Material, MaterialKind, Principled, Surface},
     math::colour::luminance,
     measured::MeasuredTable,
     texture::{Interpolation, TextureUse},
@@ -75,6 +75,13 @@ impl<'a> Subject<'a> {
         }
         if material.sheen_color != Vec3::ZERO {
             self.warn("its sheen is left out");
+        }
+    }
+
+    /// Names normals of Beckmann's, for formats and models that have none.
+    pub(super) fn without_beckmann(&mut self) {
+        if self.surface.distribution == Distribution::Beckmann {
+            self.warn("its microfacets become GGX of the same width");
         }
     }
 

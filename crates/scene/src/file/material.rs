@@ -9,6 +9,7 @@ use super::{
     Entry,
     value::{TextureEntry, Textured},
 };
+use crate::material::Distribution;
 
 pub(crate) type MaterialEntry = Entry<MaterialKeys, MaterialKindEntry>;
 
@@ -28,6 +29,9 @@ pub(crate) struct MaterialKeys {
     /// Angle from the tangent, along u, to where they are widest.
     #[serde(default)]
     pub anisotropy_rotate_deg: f32,
+    /// Normals of a rough `conductor`, `plastic` or `dielectric`.
+    #[serde(default)]
+    pub distribution: Distribution,
     /// Share of light that the surface stops, 0…1; the rest goes straight through. Default: 1.
     pub opacity: Option<Textured<f32>>,
     /// Opacity from which the surface is opaque, and below which it is not there. Default: none.

@@ -13,7 +13,7 @@ use crate::{
     Asked, EnvironmentMap, FilmSettings, Geometry, Lamp, MIN_ALPHA,
     features::{Feature, Ignored},
     file::CameraEntry,
-    material::{Anisotropy, Material, MaterialKind},
+    material::{Anisotropy, Distribution, Material, MaterialKind},
     texture::{
         TextureUse,
         linear::{Texelwise, lie_alike},
@@ -50,17 +50,19 @@ pub(crate) struct Width {
     pub texture: Option<TextureUse>,
     /// Stretch of the width, of which `alpha` is then the smaller.
     pub anisotropy: Anisotropy,
+    pub distribution: Distribution,
 }
 
 impl Width {
     pub(crate) fn round(alpha: f32, texture: Option<TextureUse>) -> Self {
-        Self { alpha, texture, anisotropy: Anisotropy::default() }
+        let (anisotropy, distribution) = (Anisotropy::default(), Distribution::default());
+        Self { alpha, texture, anisotropy, distribution }
     }
 
     /// Width of two along u and v.
     pub(crate) fn of_pair(widths: [f32; 2]) -> Self {
         let (alpha, anisotropy) = Anisotropy::of_widths(widths);
-        Self { alpha, texture: None, anisotropy }
+        Self { anisotropy, ..Self::round(alpha, None) }
     }
 
     /// Width of a roughness √α that the parameter `anisotropic` of \[Burley 2012\], 0…1, stretches.

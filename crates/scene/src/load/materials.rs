@@ -14,8 +14,8 @@ use crate::{
     error::{Error, Result},
     file::{MaterialEntry, MaterialKeys, MaterialKindEntry, TextureEntry, Textured},
     material::{
-        Anisotropy, ConductorFresnel, Emission, Material, MaterialKind, Opacity, Principled,
-        Surface,
+        Anisotropy, ConductorFresnel, Distribution, Emission, Material, MaterialKind, Opacity,
+        Principled, Surface,
     },
     measured::MeasuredFiles,
     texture::{Encoding, Texture, TextureCache, TextureUse},
@@ -70,6 +70,15 @@ impl Loader<'_> {
                 matches!(kind, MaterialKind::Conductor { .. } | MaterialKind::Principled(_));
             let message = "anisotropy is for conductor and principled materials";
             reader.check(can_stretch || reader.surface.anisotropy.strength == 0.0, message)?;
+            let has_distribution = matches!(
+                kind,
+                MaterialKind::Conductor { .. }
+                    | MaterialKind::Plastic { .. }
+                    | MaterialKind::Dielectric { .. }
+            );
+            let is_default = reader.surface.distribution == Distribution::default();
+            let message = "distribution is for conductor, plastic and dielectric materials";
+            reader.check(has_distribution || is_default, message)?;
             let surface = std::mem::take(&mut reader.surface);
             scene.materials.push(Material { name: name.clone(), kind, surface });
         }
@@ -112,6 +121,7 @@ impl Reader<'_> {
     fn read_surface(&mut self, keys: &MaterialKeys) -> Result<()> {
         self.surface.vertex_color = keys.vertex_color;
         self.surface.two_sided = keys.two_sided;
+        self.surface.distribution = keys.distribution;
         if let Some(entry) = &keys.normal {
             let message = "normal: a normal map has a strength, found factor";
             self.check(entry.factor.is_none(), message)?;

@@ -15,7 +15,7 @@ use crate::{
     error::Result,
     features,
     import::{SOLID_IOR, Value, Width, blend::numbers, media},
-    material::{ConductorFresnel, Material, MaterialKind, Surface},
+    material::{ConductorFresnel, Distribution, Material, MaterialKind, Surface},
     math::colour::luminance,
 };
 
@@ -110,17 +110,19 @@ impl Reader {
             }
             "conductor" | "mirror" => self.conductor(&parameters, None)?,
             "roughconductor" | "roughmetal" => {
-                let Width { alpha, texture, anisotropy } = self.width(&parameters)?;
+                let Width { alpha, texture, anisotropy, distribution } = self.width(&parameters)?;
                 let mut model = self.conductor(&parameters, Some(alpha))?;
                 model.surface.roughness = texture;
                 model.surface.anisotropy = anisotropy;
+                model.surface.distribution = distribution;
                 model
             }
             "dielectric" => self.dielectric(&parameters, Some(0.0))?,
             "roughdielectric" | "roughglass" => {
-                let Width { alpha, texture, .. } = self.round_width(&parameters)?;
+                let Width { alpha, texture, distribution, .. } = self.round_width(&parameters)?;
                 let mut model = self.dielectric(&parameters, Some(alpha))?;
                 model.surface.roughness = texture;
+                model.surface.distribution = distribution;
                 model
             }
             "thindielectric" => self.dielectric(&parameters, None)?,
@@ -227,18 +229,20 @@ impl Reader {
 
     pub(super) fn width(&mut self, parameters: &Parameters<'_>) -> Result<Width> {
         let node = parameters.node;
-        match parameters.string("distribution")? {
-            Some("ggx") => {}
-            None | Some("beckmann" | "phong" | "as") => {
-                self.ignored.add(features::MI_BECKMANN, || node.place());
+        let distribution = match parameters.string("distribution")? {
+            Some("ggx") => Distribution::Ggx,
+            None | Some("beckmann") => Distribution::Beckmann,
+            Some("phong" | "as") => {
+                self.ignored.add(features::MI_DISTRIBUTION, || node.place());
+                Distribution::Beckmann
             }
             Some(found) => {
                 let message = format!("distribution: expected ggx or beckmann, found `{found}`");
                 return Err(node.error(message));
             }
-        }
+        };
         parameters.without_effect("sample_visible specular_sampling_weight");
-        self.width_of(parameters)
+        Ok(Width { distribution, ..self.width_of(parameters)? })
     }
 
     /// The same for a model whose width is one for all directions.
@@ -323,15 +327,17 @@ impl Reader {
         }
         if let Some(width) = &width {
             let root = width.texture.as_ref().map_or(1.0, |texture| texture.mean()[0]);
-            value =
-                value.mapped(LossyCoat::new(width.alpha * root * root, ior).albedo(is_nonlinear));
+            let coat = LossyCoat::new(width.distribution, width.alpha * root * root, ior);
+            value = value.mapped(coat.albedo(is_nonlinear));
         } else if is_nonlinear {
             value = value.mapped(albedo_below_coat(ior));
         }
-        let Width { alpha, texture, .. } = width.unwrap_or(Width::round(MIN_ALPHA, None));
+        let Width { alpha, texture, distribution, .. } =
+            width.unwrap_or(Width::round(MIN_ALPHA, None));
         let plastic = |diffuse| MaterialKind::Plastic { diffuse, alpha, ior };
         let mut model = colored(value, plastic);
         model.surface.roughness = texture;
+        model.surface.distribution = distribution;
         Ok(model)
     }
 

@@ -15,7 +15,7 @@ use crate::{
     error::Result,
     features,
     import::{Value, Width, blend::mixed},
-    material::{Material, MaterialKind, Principled},
+    material::{Distribution, Material, MaterialKind, Principled},
     math::colour::luminance,
 };
 
@@ -95,6 +95,8 @@ impl Reader {
             self.round_width(parameters)?
         };
         let ior = self.ior(parameters, "bk7")?;
+        let distributions = [width.distribution, model.surface.distribution];
+        model.surface.distribution = width.distribution;
         let coated = |reflectance, alpha| {
             let metal = Principled::coated_metal(reflectance, alpha, width.mean_roughness());
             MaterialKind::Principled(metal)
@@ -110,6 +112,12 @@ impl Reader {
             }
             MaterialKind::Mirror { reflectance } => model.kind = coated(reflectance, 0.0),
             _ => self.ignored.add(features::MI_COATING, || parameters.node.place()),
+        }
+        if let MaterialKind::Principled(_) = model.kind {
+            model.surface.distribution = Distribution::Ggx;
+            if distributions.contains(&Distribution::Beckmann) {
+                self.ignored.add(features::MI_DISTRIBUTION, || parameters.node.place());
+            }
         }
         Ok(model)
     }

@@ -45,6 +45,7 @@ impl<'a> Translator<'a> {
         };
         self.pbr(&core, color);
         self.anisotropy();
+        self.subject.without_beckmann();
         if let Some(emission) = surface.emission.as_ref().filter(|_| !is_unlit) {
             self.emission(emission);
         }

@@ -15,7 +15,7 @@ use crate::{
         subject::{Opacity, Subject, difference_of_index, index_of},
         triple,
     },
-    material::{ConductorFresnel, MaterialKind},
+    material::{ConductorFresnel, Distribution, MaterialKind},
     math::colour::luminance,
     measured::RglTraits,
     texture::TextureUse,
@@ -105,7 +105,7 @@ impl Translator<'_> {
             MaterialKind::Plastic { diffuse, alpha, ior } => {
                 self.warn_of_masking(*alpha, "plastic");
                 let base = self.plastic_base(*diffuse, *alpha, *ior);
-                let mut content = self.ggx(*alpha);
+                let mut content = self.microfacets(*alpha);
                 content += &self.color("diffuse_reflectance", base);
                 content += &float("int_ior", *ior);
                 content += &float("ext_ior", 1.0);
@@ -117,7 +117,7 @@ impl Translator<'_> {
                 fresnel: ConductorFresnel::Exact { reflectance, eta, k },
             } => {
                 self.warn_of_masking(*alpha, "conductor");
-                let content = self.ggx(*alpha)
+                let content = self.microfacets(*alpha)
                     + &self.color("specular_reflectance", *reflectance)
                     + &rgb("eta", *eta)
                     + &rgb("k", *k);
@@ -129,6 +129,7 @@ impl Translator<'_> {
             } => {
                 // Use a fully metallic `principled`, which has Schlick's Fresnel on the same GGX lobe.
                 self.warn_of_masking(*alpha, "conductor");
+                self.subject.without_beckmann();
                 let content = self.color("base_color", *reflectance)
                     + &float("metallic", 1.0)
                     + &self.roughness(alpha.sqrt());
@@ -167,7 +168,7 @@ impl Translator<'_> {
                 let glass = self.glass(*ior, *reflectance, *transmittance);
                 if *alpha > 0.0 {
                     self.warn_of_masking(*alpha, "dielectric");
-                    element("roughdielectric", &(self.ggx(*alpha) + &glass))
+                    element("roughdielectric", &(self.microfacets(*alpha) + &glass))
                 } else {
                     element("dielectric", &glass)
                 }
@@ -206,7 +207,7 @@ impl Translator<'_> {
         let surface = self.subject.surface;
         let roughness = surface.roughness.as_ref();
         let root = roughness.map_or(1.0, |used| luminance(used.mean().into()));
-        let factor = LossyCoat::new(alpha * root * root, ior).base_factor();
+        let factor = LossyCoat::new(surface.distribution, alpha * root * root, ior).base_factor();
         let texels = surface.color.iter().flat_map(|used| used.values());
         let lightest = texels.map(|[r, g, b, _]| r.max(g).max(b)).reduce(f32::max).unwrap_or(1.0)
             * diffuse.max_element();
@@ -277,14 +278,18 @@ impl Translator<'_> {
         }
     }
 
-    /// Parameters of a GGX model of width `alpha`.
-    fn ggx(&mut self, alpha: f32) -> String {
+    /// Parameters of microfacets of width `alpha`.
+    fn microfacets(&mut self, alpha: f32) -> String {
         let alpha = match (self.subject.widths(alpha), self.subject.width(alpha)) {
             (Some([along_u, along_v]), _) => float("alpha_u", along_u) + &float("alpha_v", along_v),
             (None, Some((used, recipe))) => self.bitmap("alpha", used, recipe),
             (None, None) => float("alpha", alpha),
         };
-        property("string", "distribution", "ggx") + &alpha
+        let distribution = match self.subject.surface.distribution {
+            Distribution::Ggx => "ggx",
+            Distribution::Beckmann => "beckmann",
+        };
+        property("string", "distribution", distribution) + &alpha
     }
 
     /// Texture element; the image is written later.

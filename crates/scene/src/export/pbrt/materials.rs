@@ -187,6 +187,7 @@ impl<'a> Translator<'a> {
     }
 
     fn roughness(&mut self, alpha: f32) -> String {
+        self.subject.without_beckmann();
         let width = match (self.subject.widths(alpha), self.subject.width(alpha)) {
             (Some([along_u, along_v]), _) => {
                 float("uroughness", along_u) + &float("vroughness", along_v)
