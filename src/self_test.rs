@@ -206,7 +206,7 @@ impl Answers {
                 &[&scene, wave_set, &film],
                 &wave,
                 None,
-            );
+            )?;
         }
         commands.submit_and_wait()?;
 

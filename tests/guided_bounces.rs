@@ -163,9 +163,9 @@ fn bounce(
     let push = bytemuck::bytes_of(&wave);
     let mut commands = Commands::begin(device).unwrap();
     // Find the cell.
-    commands.dispatch(&sample, &sets, push, paths);
-    commands.dispatch(&bounce, &sets, push, paths);
-    commands.dispatch(&learn, &sets, push, paths);
+    commands.dispatch(&sample, &sets, push, paths).unwrap();
+    commands.dispatch(&bounce, &sets, push, paths).unwrap();
+    commands.dispatch(&learn, &sets, push, paths).unwrap();
     commands.submit_and_wait().unwrap();
     let rays: Vec<Ray> = waves.set.buffer(wave::RAYS).download(paths as usize).unwrap();
     let states: Vec<PathState> = waves.set.buffer(wave::PATHS).download(paths as usize).unwrap();

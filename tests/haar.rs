@@ -155,7 +155,7 @@ impl Paths {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
             let sets = [&self.scene.set, &self.nodes, &self.waves.set];
-            pass.record(&mut commands, &sets, &self.wave, None);
+            pass.record(&mut commands, &sets, &self.wave, None).unwrap();
             commands.submit_and_wait().unwrap();
         }
         support::assert_silent();

@@ -217,7 +217,7 @@ impl Paths {
         for kernel in kernels {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
-            pass.record(&mut commands, &sets, &self.wave, None);
+            pass.record(&mut commands, &sets, &self.wave, None).unwrap();
             commands.submit_and_wait().unwrap();
         }
     }

@@ -373,7 +373,7 @@ fn rays_follow_the_density_that_they_are_divided_by() {
             let pass = Pass::new(device, kernel).unwrap();
             let mut commands = Commands::begin(device).unwrap();
             let sets = [&cache.scene_buffers.set, cache.buffers.set(), &waves.set];
-            pass.record(&mut commands, &sets, &wave, None);
+            pass.record(&mut commands, &sets, &wave, None).unwrap();
             commands.submit_and_wait().unwrap();
         }
         support::assert_silent();

@@ -322,7 +322,7 @@ fn set_of(table: &'static BindingTable, content: &[(Binding, &[u8])]) -> Descrip
 fn project(shader: &str, sets: &[&DescriptorSet], constants: &impl Pod, invocations: u32) {
     let pipeline = Pipeline::new(support::device(), shader, spirv::pass(shader), &[]).unwrap();
     let mut commands = Commands::begin(support::device()).unwrap();
-    commands.dispatch(&pipeline, sets, bytemuck::bytes_of(constants), invocations);
+    commands.dispatch(&pipeline, sets, bytemuck::bytes_of(constants), invocations).unwrap();
     commands.submit_and_wait().unwrap();
     support::assert_silent();
 }

@@ -74,6 +74,7 @@ fn describe(device: &Capabilities, is_chosen: bool) -> String {
             device.max_storage_buffer_range as f64 / MEBI
         ),
         format!("    storage buffers      {} per stage", device.max_storage_buffers),
+        format!("    texel buffers        {} per stage", device.max_texel_buffers),
         format!("    push constants       {} bytes", device.max_push_constants_size),
         format!("    shared memory        {} KiB", device.max_shared_memory / 1024),
         format!("    tracer               {}", tracer(device)),

@@ -1,5 +1,7 @@
 //! Identity, limits and features of the devices, and the choice among them.
 
+use std::sync::LazyLock;
+
 use ash::vk;
 use serde::Serialize;
 
@@ -10,7 +12,11 @@ use super::{
 use crate::{
     error::{Error, Result},
     memory,
-    shader::{bindings::Kind, rooms},
+    shader::{
+        bindings::{Binding, Kind},
+        rooms,
+        spirv::{PASSES, used_bindings},
+    },
 };
 
 /// Identity, limits and features of a Vulkan device, as far as Fenestra needs them.
@@ -32,6 +38,8 @@ pub struct Capabilities {
     pub max_texel_buffer_elements: u64,
     /// Maximum number of storage buffers that one pipeline may see.
     pub max_storage_buffers: u32,
+    /// Maximum number of texel buffers that one pipeline may see.
+    pub max_texel_buffers: u32,
     /// Maximum size of the push constants, bytes.
     pub max_push_constants_size: u32,
     /// Maximum number of workgroups in a dispatch along x.
@@ -69,11 +77,9 @@ impl Capabilities {
                 missing.push(format!("{what}: needed {needed}, found {found}"));
             }
         };
-        need(
-            "storage buffers per stage",
-            u64::from(most_bindings()),
-            self.max_storage_buffers.into(),
-        );
+        let [storage_buffers, texel_buffers] = most_bindings();
+        need("storage buffers per stage", storage_buffers, self.max_storage_buffers.into());
+        need("texel buffers per stage", texel_buffers, self.max_texel_buffers.into());
         need("push constants in bytes", 128, self.max_push_constants_size.into());
         need("workgroup invocations", 64, self.max_workgroup_invocations.into());
         need("workgroups per dispatch", 65_535, self.max_workgroup_count.into());
@@ -116,18 +122,23 @@ impl Capabilities {
     }
 }
 
-/// Counts the storage buffers of the pipeline that sees most: for each set those of its largest table,
-/// but of the sampler and the film the larger one. Texel buffers do not count.
-fn most_bindings() -> u32 {
-    let [scene, sampler, wave, film] = [0, 1, 2, 3].map(|set| {
-        let tables = rooms::tables().filter(|table| table.set == set);
-        let storage_buffers = tables.map(|table| {
-            let is_storage = |kind| !matches!(kind, Kind::Texels(_));
-            table.bindings.iter().filter(|binding| is_storage(binding.kind)).count() as u32
+/// Largest numbers of storage and of texel buffers that a pass uses.
+fn most_bindings() -> [u64; 2] {
+    static MOST: LazyLock<[u64; 2]> = LazyLock::new(|| {
+        let all = || rooms::tables().flat_map(|table| table.bindings);
+        let is_texels = |binding: &Binding| matches!(binding.kind, Kind::Texels(_));
+        let counts = PASSES.iter().map(|(_, spirv)| {
+            let used = used_bindings(&bytemuck::pod_collect_to_vec(spirv));
+            let numbers = || used.iter().map(|(_, number)| *number);
+            let count = |texels: bool| {
+                let of_kind = all().filter(|binding| is_texels(binding) == texels);
+                of_kind.filter(|of| numbers().any(|number| number == of.number)).count() as u64
+            };
+            [count(false), count(true)]
         });
-        storage_buffers.max().unwrap_or(0)
+        counts.fold([0; 2], |most, own| [most[0].max(own[0]), most[1].max(own[1])])
     });
-    scene + wave + sampler.max(film)
+    *MOST
 }
 
 /// Lists the devices of an instance.
@@ -213,6 +224,9 @@ fn capabilities(instance: &Instance, index: usize, physical: vk::PhysicalDevice)
         max_storage_buffers: limits
             .max_per_stage_descriptor_storage_buffers
             .min(limits.max_descriptor_set_storage_buffers),
+        max_texel_buffers: limits
+            .max_per_stage_descriptor_sampled_images
+            .min(limits.max_descriptor_set_sampled_images),
         max_push_constants_size: limits.max_push_constants_size,
         max_workgroup_count: limits.max_compute_work_group_count[0],
         max_workgroup_invocations: limits

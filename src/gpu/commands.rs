@@ -97,6 +97,9 @@ impl Commands {
     ///
     /// Binds those of `sets` that the shader uses; `push_constants` may be empty.
     ///
+    /// # Errors
+    /// [`Error::Vulkan`](crate::Error::Vulkan) if a call fails.
+    ///
     /// # Panics
     /// If the dispatch exceeds the device's workgroup count or the push constants exceed 128 bytes.
     /// Callers size their waves by [`Capabilities`](super::Capabilities).
@@ -106,7 +109,7 @@ impl Commands {
         sets: &[&DescriptorSet],
         push_constants: &[u8],
         invocations: u32,
-    ) {
+    ) -> Result<()> {
         let groups = invocations.div_ceil(WORKGROUP_SIZE).max(1);
         assert!(
             groups <= self.device.capabilities().max_workgroup_count,
@@ -114,6 +117,9 @@ impl Commands {
             pipeline.name
         );
         assert!(push_constants.len() <= 128, "{}: too many push constants", pipeline.name);
+        let used = sets.iter().filter_map(|set| Some((set, pipeline.used(set)?)));
+        let seen = used.map(|(set, numbers)| Ok((set.index(), set.with(numbers)?)));
+        let seen = seen.collect::<Result<Vec<_>>>()?;
         let raw = &self.device.raw;
         labels::begin(&self.device, self.raw, &pipeline.name);
         self.barrier(
@@ -127,13 +133,13 @@ impl Commands {
         // and the caller keeps them alive until the submission has been waited for.
         unsafe {
             raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.made.raw);
-            for set in sets.iter().filter(|set| pipeline.uses(set)) {
+            for (index, set) in seen {
                 raw.cmd_bind_descriptor_sets(
                     self.raw,
                     vk::PipelineBindPoint::COMPUTE,
                     pipeline.made.layout,
-                    set.index(),
-                    &[set.raw],
+                    index,
+                    &[set],
                     &[],
                 );
             }
@@ -153,6 +159,7 @@ impl Commands {
         }
         labels::end(&self.device, self.raw);
         pipeline.name.clone_into(&mut self.last_pass);
+        Ok(())
     }
 
     /// Fills a whole buffer with a repeated 32-bit word.

@@ -1,9 +1,12 @@
 //! Descriptor sets, made from the tables of `shader::bindings`.
 //!
-//! A pipeline sees only the sets that its shader uses, and a set may leave bindings unwritten that the
-//! shader does not use.
+//! A pipeline sees only the sets and buffers that its shader uses; a set may lack the others.
 
-use std::{borrow::Borrow, collections::BTreeMap, sync::Arc};
+use std::{
+    borrow::Borrow,
+    collections::{BTreeMap, HashMap},
+    sync::{Arc, Mutex, PoisonError},
+};
 
 use ash::vk;
 
@@ -25,12 +28,12 @@ fn vulkan_format(format: TexelFormat) -> vk::Format {
     }
 }
 
-/// One descriptor set with its own pool.
+/// Buffers at the bindings of a table, and a descriptor set with its own pool for each choice of them that a
+/// shader has used.
 pub struct DescriptorSet {
-    pool: vk::DescriptorPool,
-    pub(super) raw: vk::DescriptorSet,
-    views: Vec<vk::BufferView>,
-    buffers: Vec<(Binding, Buffer)>,
+    seen: Mutex<HashMap<Arc<[u32]>, (vk::DescriptorPool, vk::DescriptorSet)>>,
+    /// Buffers with their views as texels.
+    buffers: Vec<(Binding, Buffer, vk::BufferView)>,
     table: &'static BindingTable,
     device: Arc<Device>,
 }
@@ -46,48 +49,67 @@ impl DescriptorSet {
         table: &'static BindingTable,
         buffers: &[(Binding, impl Borrow<Buffer>)],
     ) -> Result<Self> {
-        let count = table.bindings.len() as u32;
+        // From here on `Drop` cleans up.
+        let mut set = Self {
+            seen: Mutex::default(),
+            buffers: Vec::with_capacity(buffers.len()),
+            table,
+            device: Arc::clone(device),
+        };
+        for (binding, buffer) in buffers {
+            let buffer = buffer.borrow();
+            let view = match binding.kind {
+                Kind::One(_) | Kind::Array(_) => vk::BufferView::null(),
+                Kind::Texels(format) => set.view(buffer, format)?,
+            };
+            set.buffers.push((*binding, buffer.clone(), view));
+        }
+        Ok(set)
+    }
+
+    /// The set with the buffers of these numbers alone, which a shader uses.
+    pub(super) fn with(&self, numbers: &Arc<[u32]>) -> Result<vk::DescriptorSet> {
+        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, set)) = seen.get(numbers) {
+            return Ok(*set);
+        }
+        let device = &self.device;
+        let layouts = [device.set_layouts.of(&device.raw, numbers)?];
         let sizes = [vk::DescriptorType::STORAGE_BUFFER, vk::DescriptorType::UNIFORM_TEXEL_BUFFER]
-            .map(|ty| vk::DescriptorPoolSize::default().ty(ty).descriptor_count(count));
+            .map(|ty| {
+                vk::DescriptorPoolSize::default().ty(ty).descriptor_count(numbers.len() as u32)
+            });
         let pool_info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         // SAFETY: the device is alive.
         let pool = unsafe { device.raw.create_descriptor_pool(&pool_info, None) }
             .called("vkCreateDescriptorPool")?;
-        // From here on `Drop` cleans up.
-        let mut set = Self {
-            pool,
-            raw: vk::DescriptorSet::null(),
-            views: Vec::new(),
-            buffers: buffers.iter().map(|(at, buffer)| (*at, buffer.borrow().clone())).collect(),
-            table,
-            device: Arc::clone(device),
-        };
-        let layouts = [device.set_layouts.of(table)];
         let allocate =
             vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
-        // SAFETY: the pool has room for this one set.
-        set.raw = unsafe { device.raw.allocate_descriptor_sets(&allocate) }
-            .called("vkAllocateDescriptorSets")?[0];
-        labels::name_object(device, set.raw, table.name);
-        for (binding, buffer) in buffers {
-            let buffer = buffer.borrow();
+        // SAFETY: the pool has room for this one set, and nothing uses it if there is none.
+        let allocated = unsafe { device.raw.allocate_descriptor_sets(&allocate) }
+            .called("vkAllocateDescriptorSets")
+            .inspect_err(|_| unsafe { device.raw.destroy_descriptor_pool(pool, None) })?;
+        let set = allocated[0];
+        labels::name_object(device, set, self.table.name);
+        for (binding, buffer, view) in &self.buffers {
+            if !numbers.contains(&binding.number) {
+                continue;
+            }
             let info =
                 [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)];
-            let mut view = [vk::BufferView::null()];
+            let view = [*view];
             let write = vk::WriteDescriptorSet::default()
-                .dst_set(set.raw)
+                .dst_set(set)
                 .dst_binding(binding.number)
                 .descriptor_type(descriptor_type(binding));
             let write = match binding.kind {
                 Kind::One(_) | Kind::Array(_) => write.buffer_info(&info),
-                Kind::Texels(format) => {
-                    view[0] = set.add_view(buffer, format)?;
-                    write.texel_buffer_view(&view)
-                }
+                Kind::Texels(_) => write.texel_buffer_view(&view),
             };
             // SAFETY: set and buffer are alive and nothing uses the set yet.
             unsafe { device.raw.update_descriptor_sets(&[write], &[]) };
         }
+        seen.insert(Arc::clone(numbers), (pool, set));
         Ok(set)
     }
 
@@ -105,8 +127,8 @@ impl DescriptorSet {
         Self::new(device, table, &all)
     }
 
-    /// Makes a view of `buffer` that lives as long as the set.
-    fn add_view(&mut self, buffer: &Buffer, format: TexelFormat) -> Result<vk::BufferView> {
+    /// Makes a view of `buffer` that the set is to destroy.
+    fn view(&self, buffer: &Buffer, format: TexelFormat) -> Result<vk::BufferView> {
         let texel_bytes = format.bytes();
         let texels = buffer.size() / texel_bytes;
         let capabilities = self.device.capabilities();
@@ -128,14 +150,16 @@ impl DescriptorSet {
         // SAFETY: the buffer is alive, has texel-buffer usage and holds that many texels.
         let view = unsafe { self.device.raw.create_buffer_view(&info, None) }
             .called(&format!("vkCreateBufferView({})", buffer.name()))?;
-        self.views.push(view);
         labels::name_object(&self.device, view, buffer.name());
         Ok(view)
     }
 
     /// Bytes of the buffers in the set by their names.
     pub fn buffer_bytes(&self) -> BTreeMap<String, u64> {
-        self.buffers.iter().map(|(_, buffer)| (buffer.name().to_owned(), buffer.size())).collect()
+        self.buffers
+            .iter()
+            .map(|(_, buffer, _)| (buffer.name().to_owned(), buffer.size()))
+            .collect()
     }
 
     /// Returns the buffer at a binding.
@@ -143,8 +167,8 @@ impl DescriptorSet {
     /// # Panics
     /// If the set was made without.
     pub fn buffer(&self, binding: Binding) -> &Buffer {
-        match self.buffers.iter().find(|(at, _)| at.number == binding.number) {
-            Some((_, buffer)) => buffer,
+        match self.buffers.iter().find(|(at, ..)| at.number == binding.number) {
+            Some((_, buffer, _)) => buffer,
             None => panic!("no buffer {} in the set {}", binding.name, self.table.name),
         }
     }
@@ -161,11 +185,14 @@ impl DescriptorSet {
 
 impl Drop for DescriptorSet {
     fn drop(&mut self) {
-        // SAFETY: every submission is waited for; destroying the pool frees the set, and the views
-        // belong to the set alone.
+        let seen = self.seen.get_mut().unwrap_or_else(PoisonError::into_inner);
+        // SAFETY: every submission is waited for; destroying a pool frees its set, and the views belong to
+        // the sets alone.
         unsafe {
-            self.device.raw.destroy_descriptor_pool(self.pool, None);
-            for view in &self.views {
+            for (pool, _) in seen.values() {
+                self.device.raw.destroy_descriptor_pool(*pool, None);
+            }
+            for (.., view) in &self.buffers {
                 self.device.raw.destroy_buffer_view(*view, None);
             }
         }

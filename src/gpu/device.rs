@@ -133,7 +133,6 @@ impl Device {
             call: "memory allocator".into(),
             result: error.to_string(),
         })?;
-        let set_layouts = SetLayouts::new(&raw)?;
         let pipeline_cache = PipelineCache::load(&raw, &capabilities);
         log::info!(
             "device {}: {} ({}), {}",
@@ -150,7 +149,7 @@ impl Device {
             physical,
             tracer,
             embree,
-            set_layouts,
+            set_layouts: SetLayouts::default(),
             pipeline_cache,
             pipelines: Pipelines::default(),
             allocator: Mutex::new(Some(allocator)),

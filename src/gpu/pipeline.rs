@@ -34,20 +34,22 @@ impl Pipeline {
         Ok(Self { made, name: name.to_owned(), _device: Arc::clone(device) })
     }
 
-    /// Returns true if the shader uses buffers of this descriptor set.
-    pub(crate) fn uses(&self, set: &DescriptorSet) -> bool {
-        self.made.used[set.index() as usize].is_some_and(|number| set.has(number))
+    /// Numbers of the buffers that the shader uses, if they are those of this set.
+    pub(super) fn used(&self, set: &DescriptorSet) -> Option<&Arc<[u32]>> {
+        let numbers = &self.made.used[set.index() as usize];
+        numbers.first().is_some_and(|number| set.has(*number)).then_some(numbers)
     }
 }
 
 fn make(device: &Arc<Device>, name: &str, spirv: &[u8], constants: &[(u32, u32)]) -> Result<Made> {
     let words: Vec<u32> = bytemuck::pod_collect_to_vec(spirv);
-    let used = used_bindings(&words);
-    let first_used = [0, 1, 2, 3].map(|set| used.iter().find(|(other, _)| *other == set));
-    let layouts = first_used.map(|used| match used {
-        Some((set, number)) => device.set_layouts.with_buffer(*set, *number),
-        None => device.set_layouts.empty,
+    let all_used = used_bindings(&words);
+    let used = [0, 1, 2, 3].map(|set| {
+        let of_set = all_used.iter().filter(|(other, _)| *other == set);
+        of_set.map(|(_, number)| *number).collect::<Arc<[u32]>>()
     });
+    let layouts = used.iter().map(|numbers| device.set_layouts.of(&device.raw, numbers));
+    let layouts = layouts.collect::<Result<Vec<_>>>()?;
     let push_constants =
         [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(128)];
     let layout_info = vk::PipelineLayoutCreateInfo::default()
@@ -61,7 +63,7 @@ fn make(device: &Arc<Device>, name: &str, spirv: &[u8], constants: &[(u32, u32)]
         unsafe { device.raw.destroy_pipeline_layout(layout, None) };
     })?;
     labels::name_object(device, raw, name);
-    Ok(Made { raw, layout, used: first_used.map(|used| used.map(|(_, number)| *number)) })
+    Ok(Made { raw, layout, used })
 }
 
 fn compile(

@@ -26,12 +26,12 @@ type Place = Arc<Mutex<Option<Made>>>;
 /// Name, SHA-256 of the SPIR-V and constants that a pipeline is made from.
 type Key = (String, [u8; 32], Vec<(u32, u32)>);
 
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Made {
     pub raw: vk::Pipeline,
     pub layout: vk::PipelineLayout,
-    /// Number of a buffer that the shader uses, for each descriptor set.
-    pub used: [Option<u32>; 4],
+    /// Numbers of the buffers that the shader uses, for each descriptor set.
+    pub used: [Arc<[u32]>; 4],
 }
 
 impl Pipelines {
@@ -46,9 +46,9 @@ impl Pipelines {
         let place = Arc::clone(places.entry(key).or_default());
         drop(places);
         let mut place = place.lock().unwrap_or_else(PoisonError::into_inner);
-        match *place {
-            Some(made) => Ok(made),
-            None => make().inspect(|made| *place = Some(*made)),
+        match &*place {
+            Some(made) => Ok(made.clone()),
+            None => make().inspect(|made| *place = Some(made.clone())),
         }
     }
 
@@ -58,7 +58,7 @@ impl Pipelines {
         let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
         for (_, place) in places.drain() {
             let place = place.lock().unwrap_or_else(PoisonError::into_inner);
-            let Some(made) = *place else { continue };
+            let Some(made) = &*place else { continue };
             // SAFETY: promised by the caller.
             unsafe {
                 device.destroy_pipeline(made.raw, None);

@@ -1,4 +1,10 @@
-//! Layouts of descriptor sets, made from the tables of `shader::rooms`.
+//! Layouts of descriptor sets: of the buffers that a shader uses, and of no others, since a device counts
+//! all that a layout has.
+
+use std::{
+    collections::HashMap,
+    sync::{Mutex, PoisonError},
+};
 
 use ash::vk;
 
@@ -6,7 +12,7 @@ use super::Called;
 use crate::{
     error::Result,
     shader::{
-        bindings::{Binding, BindingTable, Kind},
+        bindings::{Binding, Kind},
         rooms,
     },
 };
@@ -19,44 +25,42 @@ pub(super) fn descriptor_type(binding: &Binding) -> vk::DescriptorType {
     }
 }
 
-/// The layout of every table, and an empty one for the sets that a shader does not use.
+/// Layouts by the numbers of their buffers, made when they are first asked for.
+#[derive(Default)]
 pub(super) struct SetLayouts {
-    tables: Vec<vk::DescriptorSetLayout>,
-    pub(super) empty: vk::DescriptorSetLayout,
+    made: Mutex<HashMap<Box<[u32]>, vk::DescriptorSetLayout>>,
 }
 
 impl SetLayouts {
-    pub(super) fn new(device: &ash::Device) -> Result<Self> {
-        let tables = rooms::tables().map(|table| create_layout(device, table.bindings));
-        Ok(Self { tables: tables.collect::<Result<_>>()?, empty: create_layout(device, &[])? })
-    }
-
-    pub(super) fn with_buffer(&self, set: u32, number: u32) -> vk::DescriptorSetLayout {
-        let has_buffer = |table: &BindingTable| {
-            table.set == set && table.bindings.iter().any(|binding| binding.number == number)
-        };
-        let found = rooms::tables().position(has_buffer);
-        found.map_or(self.empty, |index| self.tables[index])
-    }
-
-    pub(super) fn of(&self, table: &BindingTable) -> vk::DescriptorSetLayout {
-        let first = table.bindings.first();
-        first.map_or(self.empty, |binding| self.with_buffer(binding.set, binding.number))
+    pub(super) fn of(
+        &self,
+        device: &ash::Device,
+        numbers: &[u32],
+    ) -> Result<vk::DescriptorSetLayout> {
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(layout) = made.get(numbers) {
+            return Ok(*layout);
+        }
+        let layout = create_layout(device, numbers)?;
+        made.insert(numbers.into(), layout);
+        Ok(layout)
     }
 
     /// # Safety
     /// No pipeline layout or descriptor set made from these may be in use.
     pub(super) unsafe fn destroy(&self, device: &ash::Device) {
-        for layout in self.tables.iter().chain([&self.empty]) {
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        for (_, layout) in made.drain() {
             // SAFETY: promised by the caller.
-            unsafe { device.destroy_descriptor_set_layout(*layout, None) };
+            unsafe { device.destroy_descriptor_set_layout(layout, None) };
         }
     }
 }
 
-fn create_layout(device: &ash::Device, bindings: &[Binding]) -> Result<vk::DescriptorSetLayout> {
-    let bindings: Vec<_> = bindings
-        .iter()
+fn create_layout(device: &ash::Device, numbers: &[u32]) -> Result<vk::DescriptorSetLayout> {
+    let bindings: Vec<_> = rooms::tables()
+        .flat_map(|table| table.bindings)
+        .filter(|binding| numbers.contains(&binding.number))
         .map(|binding| {
             vk::DescriptorSetLayoutBinding::default()
                 .binding(binding.number)

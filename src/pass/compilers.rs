@@ -102,7 +102,7 @@ pub(crate) fn compile(device: &Arc<Device>, list: &str) -> Result<()> {
         let (shader, _) = known.ok_or_else(|| Error::usage(format!("no pass is {shader}")))?;
         let pass = Pass::new(device, Kernel::new(shader, Domain::Paths, &constants))?;
         let mut commands = Commands::begin(device)?;
-        pass.record(&mut commands, &sets, &Wave::default(), None);
+        pass.record(&mut commands, &sets, &Wave::default(), None)?;
         commands.submit_and_wait()?;
     }
     Ok(())

@@ -117,16 +117,20 @@ impl Pass {
 
     /// Records the dispatch over `wave`, binding those of `sets` that its shader uses, with as many
     /// invocations as [`Kernel::invocations`] returns.
+    ///
+    /// # Errors
+    /// Those of [`Commands::dispatch`].
     pub fn record(
         &self,
         commands: &mut Commands,
         sets: &[&DescriptorSet],
         wave: &Wave,
         most_listed: Option<u32>,
-    ) {
+    ) -> Result<()> {
         if let Some(pipeline) = &self.pipeline {
             let invocations = self.kernel.invocations(wave, most_listed);
-            commands.dispatch(pipeline, sets, bytemuck::bytes_of(wave), invocations);
+            commands.dispatch(pipeline, sets, bytemuck::bytes_of(wave), invocations)?;
         }
+        Ok(())
     }
 }

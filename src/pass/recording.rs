@@ -68,7 +68,7 @@ impl<'a> Recording<'a> {
             let ms = start.elapsed().as_secs_f64() * 1e3;
             *self.times.entry(pass.kernel.shader.to_owned()).or_default() += ms;
         }
-        pass.record(&mut self.commands, sets, wave, self.most_listed);
+        pass.record(&mut self.commands, sets, wave, self.most_listed)?;
         Ok(true)
     }
 

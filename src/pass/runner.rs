@@ -153,7 +153,7 @@ impl Runner {
             let mut commands = Commands::begin(&self.device)?;
             let film = self.film.set(0);
             let sets = sets(&self.scene, technique, &self.waves, &self.sharing, film);
-            pass.record(&mut commands, &sets, wave, None);
+            pass.record(&mut commands, &sets, wave, None)?;
             commands.submit_and_wait()?;
             self.add_compile_ms(kernel.shader, start);
             self.passes.insert(kernel.clone(), pass);

@@ -129,7 +129,7 @@ impl Projector {
                 };
                 let sets = [film, &self.shown[index]];
                 let bytes = bytemuck::bytes_of(&constants);
-                commands.dispatch(&self.show, &sets, bytes, end_place - first_place);
+                commands.dispatch(&self.show, &sets, bytes, end_place - first_place)?;
             }
         }
         commands.submit_and_wait()?;
@@ -217,7 +217,7 @@ impl Projector {
         for first_index in (0..pixels).step_by(MOST_INVOCATIONS as usize) {
             let frame = WindowFrame { first_index, ..frame };
             let invocations = MOST_INVOCATIONS.min(pixels - first_index);
-            commands.dispatch(&self.compose, &[set], bytemuck::bytes_of(&frame), invocations);
+            commands.dispatch(&self.compose, &[set], bytemuck::bytes_of(&frame), invocations)?;
         }
         commands.submit_and_wait()?;
         Ok(set.buffer(view::WINDOW_PIXELS).clone())

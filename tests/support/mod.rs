@@ -85,7 +85,7 @@ impl PathInput {
             Pipeline::new(device(), "product_state", &spirv("product_state"), &[]).unwrap();
         let film = DescriptorSet::new(device(), &PROBE, &[(probe::PROBE_INPUT, &input)]).unwrap();
         let mut commands = Commands::begin(device()).unwrap();
-        commands.dispatch(&pipeline, &[&waves.set, &film], &[], inputs.len() as u32);
+        commands.dispatch(&pipeline, &[&waves.set, &film], &[], inputs.len() as u32).unwrap();
         commands.submit_and_wait().unwrap();
     }
 }
@@ -226,7 +226,7 @@ pub fn run_probe_with<Q: Pod, A: Pod>(
     let pipeline = Pipeline::new(device, kernel, &spirv(kernel), constants).unwrap();
     let sets: Vec<_> = sets.iter().map(Borrow::borrow).chain([&own]).collect();
     let mut commands = Commands::begin(device).unwrap();
-    commands.dispatch(&pipeline, &sets, push, queries.len() as u32);
+    commands.dispatch(&pipeline, &sets, push, queries.len() as u32).unwrap();
     commands.submit_and_wait().unwrap();
     let answers = output.download(queries.len()).unwrap();
     assert_silent();
