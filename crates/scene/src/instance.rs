@@ -8,7 +8,7 @@ use super::transform::Transform;
 /// meshes that repeat become instances. Placed copies are faster to trace (`docs/traversal.md`).
 pub const PLACED_TRIANGLES: usize = 1 << 20;
 
-/// Triangles of a mesh below which its copies are always placed: an instance takes as much memory as
+/// Triangles of a mesh below which up to 2²⁴ of its copies are placed: an instance takes as much memory as
 /// three triangles, and a ray that enters it about as long as a few nodes.
 pub const FEWEST_INSTANCED: usize = 32;
 
@@ -29,7 +29,8 @@ impl Budget {
     /// many to be placed with those before.
     pub fn takes_instances(&mut self, copies: usize, triangles: usize) -> bool {
         let all = self.placed_triangles.saturating_add(copies.saturating_mul(triangles));
-        let instances = all > PLACED_TRIANGLES && triangles >= FEWEST_INSTANCED;
+        let least = if all > 1 << 24 { 4 } else { FEWEST_INSTANCED };
+        let instances = all > PLACED_TRIANGLES && triangles >= least;
         if !instances {
             self.placed_triangles = all;
         }

@@ -4,7 +4,10 @@
 
 use std::{fmt::Write, path::Path};
 
-use fenestra_scene::{Geometry, Scene, instance::PLACED_TRIANGLES};
+use fenestra_scene::{
+    Geometry, Scene,
+    instance::{Budget, PLACED_TRIANGLES},
+};
 use glam::Vec3;
 
 use crate::support::{
@@ -134,6 +137,21 @@ fn pbrt_objects_of(mirror: &str, uses: usize) -> String {
         .unwrap();
     }
     text
+}
+
+#[test]
+fn small_meshes_are_placed_while_they_fit() {
+    let mut budget = Budget::default();
+    for (copies, triangles, are_instances) in [
+        (1000, 100, false),
+        (1 << 20, 100, true),
+        (1 << 20, 12, false),
+        (1 << 20, 12, true),
+        (1 << 20, 3, false),
+    ] {
+        let found = budget.takes_instances(copies, triangles);
+        assert_eq!(found, are_instances, "{copies} × {triangles}");
+    }
 }
 
 #[test]
