@@ -19,6 +19,14 @@ pub struct Material {
 }
 
 impl Material {
+    /// Largest colour that the image of the surface makes; the renderer cuts colours off at 1.
+    pub(crate) fn largest_color(&self) -> f32 {
+        let Some(image) = &self.surface.color else { return 0.0 };
+        let most = image.largest();
+        let mut kind = self.kind.clone();
+        kind.colors().iter().map(|own| (**own * most).max_element()).fold(0.0, f32::max)
+    }
+
     /// Makes an opaque, two-sided material without textures or emission.
     pub fn new(name: impl Into<String>, kind: MaterialKind) -> Self {
         Self { name: name.into(), kind, surface: Surface::default() }
@@ -288,33 +296,41 @@ impl MaterialKind {
 
     /// The same with factors of its colour, its roughness and its share of metal.
     pub(crate) fn scaled(&self, color: Vec3, rough: f32, metal: f32) -> Self {
-        let tint = |own: &mut Vec3| *own = (*own * color).clamp(Vec3::ZERO, Vec3::ONE);
         let mut kind = self.clone();
+        for own in kind.colors() {
+            *own = (*own * color).clamp(Vec3::ZERO, Vec3::ONE);
+        }
         match &mut kind {
-            Self::Diffuse { reflectance: own }
-            | Self::Mirror { reflectance: own }
-            | Self::Plastic { diffuse: own, .. } => tint(own),
-            Self::DiffuseTransmission { reflectance, transmittance } => {
-                tint(reflectance);
-                tint(transmittance);
-            }
-            Self::Conductor { alpha, fresnel } => {
-                *alpha = (*alpha * rough * rough).clamp(0.0, 1.0);
-                let (ConductorFresnel::Schlick { reflectance }
-                | ConductorFresnel::Exact { reflectance, .. }) = fresnel;
-                tint(reflectance);
-            }
+            Self::Conductor { alpha, .. } => *alpha = (*alpha * rough * rough).clamp(0.0, 1.0),
             Self::Principled(own) => {
-                tint(&mut own.base_color);
                 own.metallic = (own.metallic * metal).clamp(0.0, 1.0);
                 own.roughness = (own.roughness * rough).clamp(0.0, 1.0);
             }
-            Self::Dielectric { transmittance, .. } | Self::ThinDielectric { transmittance, .. } => {
-                tint(transmittance)
-            }
-            Self::Measured { .. } => {}
+            _ => {}
         }
         kind
+    }
+
+    /// Colours that [`Surface::color`] is a factor of.
+    pub(crate) fn colors(&mut self) -> Vec<&mut Vec3> {
+        match self {
+            Self::Diffuse { reflectance: own }
+            | Self::Mirror { reflectance: own }
+            | Self::Plastic { diffuse: own, .. }
+            | Self::Conductor {
+                fresnel:
+                    ConductorFresnel::Schlick { reflectance: own }
+                    | ConductorFresnel::Exact { reflectance: own, .. },
+                ..
+            }
+            | Self::Principled(Principled { base_color: own, .. })
+            | Self::Dielectric { transmittance: own, .. }
+            | Self::ThinDielectric { transmittance: own, .. } => vec![own],
+            Self::DiffuseTransmission { reflectance, transmittance } => {
+                vec![reflectance, transmittance]
+            }
+            Self::Measured { .. } => Vec::new(),
+        }
     }
 
     /// Absorption coefficient of the inside, per metre, of a dielectric that absorbs.

@@ -123,6 +123,25 @@ fn arrays_stand_for_files() {
     assert!(message.ends_with("uvs: expected one for each of 4 positions, found 1"), "{message}");
 }
 
+/// A colour above 1 is cut off, and is said so.
+#[test]
+fn images_above_one_are_named() {
+    let folder = Folder::new();
+    let image = |largest: f32| {
+        let pixels = [[0.5, 0.0, largest], [0.25; 3]];
+        Image::of_rgb(2, 1, &pixels).write_exr(&folder.path().join("a.exr")).unwrap();
+    };
+    let warnings = |factor: f32| {
+        let used = format!("{{ texture = \"a.exr\", factor = {factor} }}");
+        load(&folder, &HEAD.replace("[0.5, 0.5, 0.5]", &used)).unwrap().warnings
+    };
+    image(4.0);
+    assert_eq!(warnings(0.25), Vec::<String>::new());
+    assert_contains(&warnings(0.5).concat(), &["cut off in 1 of 1 materials: `grey` has 2"]);
+    image(1.0);
+    assert_eq!(warnings(1.0), Vec::<String>::new());
+}
+
 // Scene files
 
 /// Compositors know objects by the names of a scene, or of a file that is one or is included.

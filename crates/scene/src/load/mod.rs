@@ -175,6 +175,8 @@ fn viewed(camera: &CameraEntry, options: &LoadOptions) -> CameraEntry {
 
 /// Steps of single precision that the longest side of a scene should have.
 const LEAST_STEPS: f32 = 2e4;
+/// Colour above which a material reflects too much, but for rounding.
+const CUT: f32 = 1.001;
 /// Range of every finite number.
 const FINITE: (f32, f32) = (f32::MIN, f32::MAX);
 
@@ -245,6 +247,17 @@ impl<'a> Loader<'a> {
                     self.path.display()
                 ));
             }
+        }
+        let largest = scene.materials.iter().map(|own| (own.largest_color(), &own.name));
+        let cut: Vec<_> = largest.filter(|(largest, _)| *largest > CUT).collect();
+        if let Some((largest, name)) = cut.iter().max_by(|(a, _), (b, _)| a.total_cmp(b)) {
+            let count = cut.len();
+            scene.warnings.push(format!(
+                "{}: colours of images above 1 are cut off in {count} of {} materials: `{name}` has \
+                 {largest}",
+                self.path.display(),
+                scene.materials.len()
+            ));
         }
         scene.hash = super::hash::hash(&scene);
         scene

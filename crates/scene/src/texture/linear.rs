@@ -82,6 +82,17 @@ impl TextureUse {
         self
     }
 
+    /// Largest value of each channel, or a bound that is at most 1.
+    pub(crate) fn largest(&self) -> Vec3 {
+        let color = |texel| Vec4::from(texel).truncate();
+        let bound = color(self.read([0.0; 4])).max(color(self.read([1.0; 4])));
+        let is_float = matches!(self.texture.texels, Texels::Halves(_));
+        if !is_float && bound.max_element() <= 1.0 {
+            return bound;
+        }
+        self.values().into_iter().map(color).reduce(Vec3::max).unwrap_or(bound)
+    }
+
     /// Mean value over the image, by channel. Where a surface shows the image in part or more than
     /// once, the mean over the surface differs: good for choosing, not for weighing.
     pub fn mean(&self) -> [f32; 3] {
