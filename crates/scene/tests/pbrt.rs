@@ -129,6 +129,29 @@ fn fov_is_that_of_the_shorter_side_and_lenses_scale() {
     let half = (0.5 * scene.camera.vertical_fov_deg).to_radians().tan();
     let [x, y] = scene.camera.shift.map(|heights| 2.0 * heights * half);
     assert!((half - 0.25).abs() < 1e-6 && (x - 0.4444444).abs() < 1e-6 && (y + 1.0).abs() < 1e-6);
+    // Rays through the corners of a crop are those of the whole film.
+    for (crop, [left, right, top, bottom]) in [
+        (r#""float cropwindow" [0.5 1 0.25 0.5]"#, [640.0, 1280.0, 180.0, 360.0]),
+        (r#""integer pixelbounds" [100 400 -7 60]"#, [100.0, 400.0, 0.0, 60.0]),
+    ] {
+        let scene = load(&format!("Film \"rgb\" {crop} Camera \"perspective\""), "");
+        assert_eq!(warnings(&scene), [DARK]);
+        let (width, height) = (scene.film.width as f32, scene.film.height as f32);
+        assert_eq!([width, height], [right - left, bottom - top]);
+        let tall = 2.0 * (0.5 * scene.camera.vertical_fov_deg).to_radians().tan();
+        let [x, y] = scene.camera.shift;
+        for (side, found) in [(-0.5, left), (0.5, right)] {
+            let expected = (found - 640.0) / 360.0;
+            assert!((tall * (x + side * width / height) - expected).abs() < 1e-5, "{crop}");
+        }
+        for (side, found) in [(0.5, top), (-0.5, bottom)] {
+            assert!((tall * (y + side) - (360.0 - found) / 360.0).abs() < 1e-5, "{crop}");
+        }
+    }
+    let folder = Folder::new();
+    let empty = "Film \"rgb\" \"float cropwindow\" [0.5 0.5 0 1] WorldBegin";
+    let message = Scene::load(&folder.write("room.pbrt", empty)).unwrap_err().to_string();
+    assert!(message.contains("expected a crop of at least a pixel"), "{message}");
 }
 
 #[test]
@@ -1366,7 +1389,7 @@ fn everything_left_out_is_named_once() {
     let head = r#"Option "seed" 3
         ColorSpace "rec2020"
         Integrator "ambientocclusion" "integer maxdepth" 7
-        Film "rgb" "string sensor" "canon_eos_100d" "float cropwindow" [0 1 0 0.5]
+        Film "rgb" "string sensor" "canon_eos_100d" "float maxcomponentvalue" 10
         Camera "perspective" "float halffov" 3"#;
     let world = format!(
         r#"ActiveTransform StartTime
@@ -1392,7 +1415,7 @@ fn everything_left_out_is_named_once() {
         "ignored other media (5, first in line 8)",
         "ignored Integrator `ambientocclusion` (line 3)",
         "ignored sensor `canon_eos_100d` (line 4)",
-        "ignored `cropwindow` of the film (line 4)",
+        "ignored `maxcomponentvalue` of the film (line 4)",
         "ignored parameter `halffov` of Camera \"perspective\" (line 5)",
         "ignored `phimax` of Shape \"sphere\" (2, first in line 10)",
         "ignored parameter `sharp` of Shape \"sphere\" (2, first in line 10)",

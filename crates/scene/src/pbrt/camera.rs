@@ -1,6 +1,6 @@
 //! Camera, film and filter of a scene description.
 
-use glam::{DMat4, DVec3};
+use glam::{DMat4, DVec2, DVec3};
 
 use super::{
     directives::Description,
@@ -25,7 +25,7 @@ pub(super) struct View {
 /// left-handed world. The renderer is right-handed. If the camera does not mirror already, the whole
 /// world is mirrored in z, and the picture is the same.
 pub(super) fn view(description: &Description, log: &mut Log) -> Result<View> {
-    let (film, mut exposure, aspect) = film(description, log)?;
+    let (film, mut exposure, crop) = film(description, log)?;
     let left_handed = DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0));
     let Some((entity, camera_from_world)) = &description.camera else {
         return Ok(View { camera: None, film, exposure, mirror: left_handed });
@@ -45,7 +45,7 @@ pub(super) fn view(description: &Description, log: &mut Log) -> Result<View> {
         return Err(entity.error("the shutter closes before it opens"));
     }
     exposure *= time as f32;
-    let (vertical_fov_deg, shift) = window(entity, aspect, log)?;
+    let (vertical_fov_deg, shift) = window(entity, &crop, log)?;
     let renderer_from_camera = mirror * world_from_camera;
     let position = renderer_from_camera.w_axis.truncate();
     let axis = |axis: DVec3| renderer_from_camera.transform_vector3(axis);
@@ -68,8 +68,18 @@ pub(super) fn view(description: &Description, log: &mut Log) -> Result<View> {
     Ok(View { camera: Some(camera), film, exposure, mirror })
 }
 
-/// Field of view from bottom to top, degrees, and shift of the lens; `fov` is that of the shorter side.
-fn window(entity: &Entity, aspect: f64, log: &mut Log) -> Result<(f64, [f64; 2])> {
+/// Part of a film that is rendered.
+struct Crop {
+    /// Pixels of the whole film.
+    whole: DVec2,
+    /// First pixel from the upper left corner, and the one past the last.
+    bounds: [DVec2; 2],
+}
+
+/// Field of view from bottom to top, degrees, and shift of the lens; `fov` is that of the shorter side of the
+/// whole film.
+fn window(entity: &Entity, crop: &Crop, log: &mut Log) -> Result<(f64, [f64; 2])> {
+    let aspect = crop.whole.x / crop.whole.y;
     let fov = entity.number("fov", 90.0)?;
     if !(fov > 0.0 && fov < 180.0) {
         return Err(entity.error(format!("expected a `fov` from 0 to 180 degrees, found {fov}")));
@@ -79,25 +89,31 @@ fn window(entity: &Entity, aspect: f64, log: &mut Log) -> Result<(f64, [f64; 2])
         log.ignore(features::PBRT_ASPECT, entity.place_of("frameaspectratio"));
     }
     let mut height = if aspect >= 1.0 { 2.0 } else { 2.0 / aspect };
-    let mut shift = [0.0; 2];
+    let mut shift = DVec2::ZERO;
     if let [left, right, bottom, top] = *entity.numbers("screenwindow", Kind::Float)? {
         height = top - bottom;
         if height <= 0.0 {
             return Err(entity.error("expected a `screenwindow` with a height above 0"));
         }
-        shift = [0.5 * (left + right) / height, 0.5 * (bottom + top) / height];
+        shift = DVec2::new(left + right, bottom + top) * 0.5 / height;
         if ((right - left) / height - aspect).abs() > 1e-3 * aspect {
             log.ignore(features::PBRT_SCREEN_WINDOW, entity.place_of("screenwindow"));
         }
     }
-    let tangent = (0.5 * fov).to_radians().tan() * 0.5 * height;
-    Ok(((2.0 * tangent.atan()).to_degrees(), shift))
+    // Of the whole film, whose middle is that of the window; then of the crop.
+    let [low, high] = crop.bounds;
+    let share = (high.y - low.y) / crop.whole.y;
+    let middle = (0.5 * (low + high) - 0.5 * crop.whole) / crop.whole.y;
+    let tangent = (0.5 * fov).to_radians().tan() * 0.5 * height * share;
+    let shift = (shift + DVec2::new(middle.x, -middle.y)) / share;
+    Ok(((2.0 * tangent.atan()).to_degrees(), shift.to_array()))
 }
 
-/// Film, the factor of its sensor and its ratio of width to height.
-fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, f64)> {
+/// Film, the factor of its sensor, and the part that the film is of a whole one.
+fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, Crop)> {
     let mut film = FilmSettings { width: 1280, height: 720, filter: filter(description, log)? };
     let mut exposure = 1.0;
+    let mut bounds = None;
     if let Some(entity) = &description.film {
         let side = |name: &str, otherwise: u32| {
             let found = entity.number(name, f64::from(otherwise))?;
@@ -119,7 +135,15 @@ fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, 
             let name = format!("sensor `{}`", sensor.text());
             log.ignore_named(features::PBRT_SENSOR, &name, &sensor.place);
         }
-        for name in ["whitebalance", "maxcomponentvalue", "cropwindow", "pixelbounds"] {
+        let size = DVec2::new(film.width.into(), film.height.into());
+        if let [left, right, top, bottom] = *entity.numbers("pixelbounds", Kind::Integer)? {
+            bounds = Some([DVec2::new(left, top), DVec2::new(right, bottom)]);
+        }
+        if let [left, right, top, bottom] = *entity.numbers("cropwindow", Kind::Float)? {
+            let pixel = |x, y| (DVec2::new(x, y) * size).ceil();
+            bounds = Some([pixel(left, top), pixel(right, bottom)]);
+        }
+        for name in ["whitebalance", "maxcomponentvalue"] {
             let part = format!("`{name}` of the film");
             log.ignore_named(features::PBRT_FILM, &part, entity.place_of(name));
         }
@@ -127,8 +151,14 @@ fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, 
         entity.without_effect("filename savefp16 diagonal coordinatesystem");
         log.unused(entity);
     }
-    let aspect = f64::from(film.width) / f64::from(film.height);
-    Ok((film, exposure, aspect))
+    let whole = DVec2::new(film.width.into(), film.height.into());
+    let [low, high] = bounds.unwrap_or([DVec2::ZERO, whole]).map(|at| at.clamp(DVec2::ZERO, whole));
+    let size = high - low;
+    if let (Some(entity), true) = (&description.film, size.min_element() < 1.0) {
+        return Err(entity.error(format!("expected a crop of at least a pixel, found {size}")));
+    }
+    (film.width, film.height) = (size.x as u32, size.y as u32);
+    Ok((film, exposure, Crop { whole, bounds: [low, high] }))
 }
 
 fn filter(description: &Description, log: &mut Log) -> Result<Filter> {
