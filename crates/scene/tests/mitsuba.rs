@@ -1378,12 +1378,14 @@ fn shapes_and_models_that_are_not_there_leave_the_rest() {
         <shape type="sdfgrid"/><shape type="sdfgrid"/><shape type="ply">{}</shape>
         <shape type="ply">{}</shape>
         <shape type="rectangle"><bsdf type="velvet"/><emitter type="directionalarea"/></shape>
-        <shape type="rectangle"><ref id="light"/><bsdf type="diffuse">{texture}</bsdf></shape>"#,
+        <shape type="rectangle"><ref id="light"/><bsdf type="diffuse">{texture}</bsdf></shape>
+        <shape type="rectangle"><emitter type="area"><texture type="mesh_attribute" name="radiance">
+        <string name="name" value="vertex_color"/></texture></emitter></shape>"#,
         file("absent.ply"),
         file("ball.PLY"),
     );
     let scene = loaded(&folder.write("a.xml", document(&text)));
-    assert_eq!(scene.geometry.triangles.len(), 1 + 2 + 2);
+    assert_eq!(scene.geometry.triangles.len(), 1 + 2 + 2 + 2);
     let emission = scene.materials.iter().find_map(|material| material.surface.emission.as_ref());
     assert_eq!(emission.unwrap().radiance, Vec3::splat(3.0));
     for expected in [
@@ -1393,12 +1395,13 @@ fn shapes_and_models_that_are_not_there_leave_the_rest() {
         "in another case (`ball.PLY`)",
         "`velvet`, which is diffuse of 0.5 (line 9)",
         "ignored emitter `directionalarea` of a shape (line 9)",
+        "ignored emitter `area` of the colours of vertices (line 11)",
     ] {
         let is_named = |text: &&String| text.contains(expected);
         let count = scene.warnings.iter().filter(is_named).count();
         assert_eq!(count, 1, "{expected}: {:#?}", scene.warnings);
     }
-    assert_eq!(scene.warnings.len(), 6, "{:#?}", scene.warnings);
+    assert_eq!(scene.warnings.len(), 7, "{:#?}", scene.warnings);
 }
 
 #[test]

@@ -112,7 +112,9 @@ impl Reader {
         parameters.without_effect("sampling_weight");
         parameters.finish(&mut self.ignored);
         if matches!(value, Value::Vertices(_)) {
-            return Err(node.error("radiance: expected a colour or a bitmap, found vertex colours"));
+            let name = "emitter `area` of the colours of vertices";
+            self.ignored.add_named(features::MI_EMITTER, name, || node.place());
+            return Ok(None);
         }
         let (radiance, texture) = value.split();
         Ok(Some(Emission { radiance, texture, two_sided: false }))
