@@ -735,6 +735,9 @@ fn spectra_become_the_colours_of_mitsuba() {
     };
     let expected = Vec3::new(2.88172, 2.47458, 1.79734);
     near(of_type("irregular", &irregular("1 3 2 5")), expected);
+    let regular = r#"<float name="wavelength_min" value="400"/><float name="wavelength_max" value="700"/>
+        <string name="values" value="1, 3, 2, 5"/>"#;
+    near(of_type("regular", regular), expected);
     let spectrum =
         format!("<spectrum name=\"radiance\" type=\"irregular\">{}</spectrum>", irregular("1"));
     let message = refusal(&format!("<emitter type=\"constant\">{spectrum}</emitter>"));

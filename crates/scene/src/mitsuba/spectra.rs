@@ -125,9 +125,18 @@ pub(super) fn color_of_kind(node: Node<'_>, role: Role) -> Result<Vec3> {
             let own = parameters.any("color")?.or(parameters.any("value")?);
             return Ok(scale * own.map_or(Ok(Vec3::ONE), |own| color(own, role))?);
         }
-        "irregular" => {
+        kind @ ("regular" | "irregular") => {
             let list = |name: &str| numbers(node, parameters.string(name)?.unwrap_or_default());
-            let (wavelengths, values) = (list("wavelengths")?, list("values")?);
+            let values = list("values")?;
+            let wavelengths = if kind == "irregular" {
+                list("wavelengths")?
+            } else {
+                let [least, most] = ["wavelength_min", "wavelength_max"]
+                    .map(|name| parameters.required(name, parameters.float(name)?));
+                let (least, most) = (f64::from(least?), f64::from(most?));
+                let step = (most - least) / (values.len() as f64 - 1.0);
+                (0..values.len()).map(|place| least + step * place as f64).collect()
+            };
             if wavelengths.len() != values.len() {
                 let message = "irregular: expected as many values as wavelengths";
                 return Err(node.error(message));
