@@ -213,8 +213,10 @@ fn crops_and_principal_points_shift_the_lens() {
             .map_or_else(String::new, |crop| names.into_iter().zip(crop).map(integer).collect());
         let film = integer(("width", 200)) + &integer(("height", 100)) + &crop;
         let number = |name: &str, value: f32| format!("<float name=\"{name}\" value=\"{value}\"/>");
+        // Along x the same angle is that of the whole film, which is twice as wide as high.
+        let (axis, tangent) = if offset[1] == 0.0 { ("x", 0.5) } else { ("y", 1.0) };
         let sensor = number("fov", 90.0)
-            + "<string name=\"fov_axis\" value=\"y\"/>"
+            + &format!("<string name=\"fov_axis\" value=\"{axis}\"/>")
             + &number("principal_point_offset_x", offset[0])
             + &number("principal_point_offset_y", offset[1]);
         let scene = camera(&sensor, &film);
@@ -224,7 +226,10 @@ fn crops_and_principal_points_shift_the_lens() {
         let aspect = scene.film.width as f32 / scene.film.height as f32;
         let found = [shift[0], shift[1], shift[1] + half, shift[0] + half * aspect];
         for (found, expected) in found.into_iter().zip([middle[0], middle[1], top, right]) {
-            assert!((found - expected).abs() < 1e-5, "{offset:?}: {found}, not {expected}");
+            assert!(
+                (found - tangent * expected).abs() < 1e-5,
+                "{offset:?}: {found}, not {expected}"
+            );
         }
     }
 }
@@ -1586,6 +1591,12 @@ fn daylight_stands_where_mitsuba_has_it() {
         sky(&format!("{upright}{}", scales.concat()), "3.0.0").texels.iter().sum::<Vec3>()
     };
     assert!((of_sky("scale", 2.0) / of_sky("sky_scale", 0.5)).abs_diff_eq(Vec3::splat(4.0), 1e-3));
+    let of_sun = |aperture: u32, scale: u32| {
+        let numbers = [("sun_aperture", aperture), ("sun_radius_scale", scale)]
+            .map(|(name, value)| format!("<float name=\"{name}\" value=\"{value}\"/>"));
+        sky(&format!("{upright}{}", numbers.concat()), "3.0.0").texels
+    };
+    assert!(of_sun(3, 2) == of_sun(6, 1), "half as wide and twice as wide again");
 }
 
 /// The zenith of version 0.6 is +Y, and its north −Z, as those of scene files.

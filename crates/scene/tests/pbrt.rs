@@ -968,6 +968,12 @@ fn a_closed_mesh_becomes_round_and_keeps_its_outside() {
         let found = first(&corners, &faces, levels);
         assert!(found.abs_diff_eq(Vec3::new(expected, expected, 0.0), 1e-6), "{found}");
     }
+    // An edge of three triangles, whose middle stays.
+    let corners =
+        [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, -1.0, 0.0]];
+    let fan = world(&subdivided(&corners, &[[0, 1, 2], [0, 1, 3], [0, 1, 4]], 1)).geometry;
+    let is_middle = |position: &[f32; 3]| Vec3::from(*position).abs_diff_eq(Vec3::ZERO, 1e-6);
+    assert!(fan.positions.iter().any(is_middle), "{:?}", fan.positions);
     let many = [[0, 1, 2]; 4096];
     let cases = [(-1, &faces[..]), (13, &faces), (i64::MAX, &faces), (12, &many)];
     for (levels, faces) in cases {
