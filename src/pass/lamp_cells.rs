@@ -578,6 +578,54 @@ mod tests {
         }
     }
 
+    /// Sixty lamps in one place above a floor, of which a list has room for 31.
+    #[test]
+    fn lists_and_estimates_have_closed_forms() {
+        let lamp = "[[lamp]]\ntype = \"point\"\nposition = [0, 2, 0]\nintensity = [3, 3, 3]\n";
+        let text = "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 40\n\
+                    [[material]]\nname = \"floor\"\ntype = \"diffuse\"\nreflectance = [0, 0, 0]\n\
+                    [[object]]\nshape = \"box\"\nsize = [1, 1, 1]\nmaterial = \"floor\"\n\
+                    translate = [0, -0.5, 0]\n"
+            .to_owned()
+            + &lamp.repeat(60);
+        let scene = Scene::parse(Path::new("a.toml"), &text).unwrap();
+        let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
+        let tables = LampTables::new(&scene, &accel, &LightGroups::new(&scene));
+        let survey = Survey {
+            accel: &accel,
+            tables: &tables,
+            passes: vec![false],
+            two_sided: vec![false],
+            radius: 1.0,
+            offset: accel.ray_offset(),
+        };
+        let place = |normal| Place { position: Vec3::ZERO, normal };
+        // All are estimated alike: 48 by rays, twelve by their share.
+        let list = survey.list(0, &[place(Vec3::Y); 4], 0.5, MOST_ENTRIES);
+        assert!((list[0].ratio - (1.0 - 31.0 / 60.0)).abs() < 1e-5, "{:?}", list[0]);
+        let cluster = &tables.clusters[0];
+        let look = |normal, least| {
+            let mut own = Estimate { cluster, score: 1.0, weight: 0.0, visibility: 0.0 };
+            survey.look(0, &mut own, [place(normal); 4].iter(), least);
+            (own.weight as f32, own.visibility)
+        };
+        let visible = (4.025_f32 / 4.25).powf(VISIBILITY_EXPONENT);
+        let hidden = 0.1_f32.powf(VISIBILITY_EXPONENT);
+        // An irradiance of ¾ at each of four places; a quarter where the lamp is nearer than the cell.
+        for (normal, least, weight, seen) in [
+            (Vec3::Y, 1.0, 3.0 * visible, visible),
+            (Vec3::Y, 16.0, 0.75 * visible, visible),
+            (Vec3::NEG_Y, 1.0, 0.0, hidden),
+        ] {
+            let found = look(normal, least);
+            let is_near = |a: f32, b: f32| (a - b).abs() < 1e-4 * b.max(1.0);
+            assert!(
+                is_near(found.0, weight) && is_near(found.1, seen),
+                "{normal} {least}: {found:?}"
+            );
+        }
+    }
+
     #[test]
     fn every_cell_and_face_has_its_own_index() {
         let grid = Grid { size: [2, 3, 4], ..Grid::default() };

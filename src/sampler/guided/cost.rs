@@ -289,6 +289,26 @@ mod tests {
         assert_eq!(middle, 1.0);
         assert!((error - 1.25 * (7.0_f64 / 3.0).sqrt()).abs() < 1e-12, "{error}");
         assert_eq!(log_ratio(&of(&[2.0]), &of(&[1.0])), (1.0, UNKNOWN_ERROR));
+        // Variances 2 and ½ around means of 2 and 0, in an image of mean 1.
+        let mut spread = Spread::default();
+        spread.add(0, &[[1.0; 3], [3.0; 3]]);
+        spread.add(1, &[[-0.5; 3], [0.5; 3]]);
+        let raw = relative_variances(&[&spread]).unwrap()[0].raw;
+        assert!((raw / (0.5 * (2.0 / 4.01 + 0.5 / 0.01)) - 1.0).abs() < 1e-12, "{raw}");
+    }
+
+    /// Arms whose samples are the same: their times alone differ, by less than times may be wrong by.
+    #[test]
+    fn times_are_means_over_rounds() {
+        let (_, costs) = race(2, |index, round, spread| {
+            for block in 0..GROUPS {
+                spread.add(spread.block_count().max(block), &[[1.0; 3], [2.0; 3], [3.0; 3]]);
+            }
+            Ok([1.0, 1.04][index] + 0.02 * f64::from(round))
+        })
+        .unwrap();
+        assert_eq!([costs[0].rounds, costs[1].rounds], [2, 2]);
+        assert!((costs[0].time - 1.01).abs() < 1e-12 && (costs[1].time - 1.05).abs() < 1e-12);
     }
 
     /// An arm whose samples are known: its time, and the deviation of its samples relative to their mean.
