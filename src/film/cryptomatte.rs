@@ -172,6 +172,10 @@ mod tests {
         merge(&mut merged, &[(&parts[0], 1.0), (&parts[1], 3.0)], 4.0);
         let expected = image(&[(two, 0.4375), (three, 0.375), (one, 0.1875)]);
         assert_eq!(merged.channels, expected.channels);
+        assert_eq!(
+            ranked(&[(9, 0.25), (3, 0.25), (5, 0.5)])[..3],
+            [(5, 0.5), (3, 0.25), (9, 0.25)]
+        );
         assert!(
             merged.channels.keys().all(|name| is_channel(name)) && !is_channel("CryptoObject.R")
         );

@@ -253,6 +253,10 @@ mod tests {
         assert_eq!(standing.to_string(), "64 spp, 3.21 Mrays/s, error 4.20%");
         standing.relative_error = Some(f64::INFINITY);
         assert_eq!(standing.to_string(), "64 spp, 3.21 Mrays/s");
+        let limits =
+            [Limit::Samples(64), Limit::Seconds(90.0), Limit::Seconds(600.0), Limit::Error(0.02)];
+        let found = limits.map(|limit| limit.to_string());
+        assert_eq!(found, ["64 spp", "90 s", "10 min", "error 2%"]);
     }
 
     /// A run whose first 8 samples take a second each, later ones a quarter.

@@ -325,6 +325,13 @@ mod tests {
         assert_eq!(fine.slowest, None);
         assert_near(Some(fine.last_error), 0.025);
         assert_near(fine.extrapolated_seconds, 40.0);
+        // One run or two of four are below the threshold at their first look.
+        let is_bound = |scale| {
+            let [first, _, last] = &runs[..] else { unreachable!() };
+            times(&[run(4, rule, 0.05), run(5, rule, scale), first.clone(), last.clone()], 0.0)[0]
+                .is_upper_bound
+        };
+        assert_eq!([is_bound(0.8), is_bound(0.05)], [false, true]);
     }
 
     #[test]

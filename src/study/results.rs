@@ -273,6 +273,65 @@ fn quoted(field: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::{
+        metrics::{Errors, parts::PartErrors},
+        runs::Conditions,
+        surfaces::Parts,
+    };
+
+    #[test]
+    fn columns_hold_what_they_say() {
+        let part = |mse| PartErrors { mse, relmse: mse + 1.0, relmse_trimmed: mse + 2.0 };
+        let measurement = Measurement {
+            spp: 1,
+            seconds: 2.0,
+            gpu_seconds: 3.0,
+            rays: 4,
+            errors: Errors { mse: 5.0, relmse: 6.0, ..Errors::default() },
+            mean_deviation: Some(7.0),
+            parts: Parts {
+                surfaces: Some(part(10.0)),
+                environment: Some(part(20.0)),
+                surfaces_judged: true,
+            },
+            ..Measurement::default()
+        };
+        let rays = BTreeMap::from([("shadow".to_owned(), 8)]);
+        let run = Run {
+            scene: "room".into(),
+            sampler: "mis".into(),
+            rule: Rule::Spp(1),
+            seed: 9,
+            conditions: Conditions { depth: 3, ..Conditions::default() },
+            measurements: vec![measurement.clone()],
+            figures: Figures { rays, visible_share: Some(0.5), ..Figures::default() },
+        };
+        let columns = columns(std::slice::from_ref(&run));
+        for (name, expected) in [
+            ("rule", "1 spp"),
+            ("seed", "9"),
+            ("depth", "3"),
+            ("seconds", "2"),
+            ("gpu_seconds", "3"),
+            ("rays", "4"),
+            ("rays_shadow_of_run", "8"),
+            ("visible_share", "0.5"),
+            ("mse", "5"),
+            ("relmse", "6"),
+            ("mean_deviation", "7"),
+            ("surfaces_mse", "10"),
+            ("surfaces_relmse", "11"),
+            ("surfaces_relmse_trimmed", "12"),
+            ("surfaces_judged", "true"),
+            ("mse_judged", "false"),
+            ("environment_mse", "20"),
+            ("environment_relmse", "21"),
+            ("flip", ""),
+        ] {
+            let (_, field) = columns.iter().find(|(own, _)| own == name).unwrap();
+            assert_eq!(field(&run, run.rule, &measurement), expected, "{name}");
+        }
+    }
 
     #[test]
     fn fields_with_commas_are_quoted() {
