@@ -145,6 +145,10 @@ mod tests {
         assert_near(mirrored.camera.look_at, [-4.0, 1.0, 4.0]);
         mirrored.go_home();
         mirrored.camera.mirrored = true;
+        mirrored.orbit(quarter, 0.0);
+        assert_near(mirrored.camera.position, [4.0, 1.0, 0.0]);
+        mirrored.go_home();
+        mirrored.camera.mirrored = true;
         mirrored.fly(Vec3::X, 1.0);
         assert_near(mirrored.camera.position, [-4.0 * PACE, 1.0, 4.0]);
         let mut moved = rig();

@@ -64,3 +64,27 @@ pub(super) fn write(
     film.write_exr(exr)?;
     write_text(toml, &camera_toml(camera))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn cameras_come_back_from_their_files() {
+        let text = "[camera]\nposition = [0.1, 2, 5]\nlook_at = [0.7, 1, 0]\nup = [0.1, 1, 0]\n\
+                    vertical_fov_deg = 33.3\nfocus_distance = 3.25\n";
+        for more in ["", "shift = [0, 0.3]\n", "mirrored = true\n", "aperture_radius = 0.01\n"] {
+            let read = |text: &str| Scene::parse(Path::new("a.toml"), text).unwrap().camera;
+            let camera = read(&(text.to_owned() + more));
+            let again = read(&camera_toml(&camera));
+            // Without a lens nothing is out of focus.
+            let focus_distance = again.focus_distance;
+            let expected =
+                if more.starts_with('a') { camera } else { Camera { focus_distance, ..camera } };
+            assert_eq!(again, expected, "{more}");
+        }
+    }
+}
