@@ -50,6 +50,8 @@ fn pictures_have_exposure_curve_part_and_layer() {
     assert_eq!(bytes(&folder, "normal.png").2[0], [188, 255, 0]);
     run(&["visible.png", "--layer", "Visible"]);
     assert_eq!(bytes(&folder, "visible.png").2[0], [137; 3]);
+    run(&["grey.png", "--layer", "Visible", "--auto-exposure"]);
+    assert_eq!(bytes(&folder, "grey.png").2[0], [118; 3], "0.18, by the layer's own luminance");
     run(&["plain.jpg"]);
     let (_, _, jpeg) = bytes(&folder, "plain.jpg");
     let is_near = |(one, other): (&u8, &u8)| one.abs_diff(*other) < 24;

@@ -320,7 +320,8 @@ fn a_resumed_run_tells_how_far_it_is() {
         Session::new(support::device(), &scene(), settings).unwrap()
     };
     let mut first = session(0.5);
-    first.renderer.render_pass(32).unwrap();
+    first.pass(1, 1.0).unwrap();
+    first.renderer.render_pass(31).unwrap();
     let sums = first.sums().unwrap();
     first.write_checkpoint(&path, sums).unwrap().unwrap();
     let differs = "sampler parameter roulette-throughput: 0.5 against 0.25";
@@ -334,6 +335,19 @@ fn a_resumed_run_tells_how_far_it_is() {
     let took = again.pass(1, 1.0).unwrap();
     let left = again.standing(&rules).seconds_left.unwrap();
     assert!((left / (31.0 * took) - 1.0).abs() < 1e-9, "{left} s left, {took} s a sample");
+    let totals = again.renderer.totals();
+    let rays = (totals.camera_rays + totals.bounce_rays + totals.shadow_rays_traced) as f64;
+    let rate = again.standing(&rules).rays_per_second;
+    assert!((rate * took / rays - 1.0).abs() < 1e-9, "{rate} rays a second, {rays} in {took} s");
+    let statistics = again.statistics(&scene(), StopReason::Samples);
+    assert!(first.seconds() > 0.0 && statistics.seconds == first.seconds() + took);
+    // By samples or by time, what the run does besides passes counts.
+    let mut third = session(0.5);
+    third.run(&Rules { samples: Some(1), ..Rules::default() }, &mut |_: &Event<'_>| ()).unwrap();
+    let left = |rules| third.standing(&rules).seconds_left.unwrap();
+    let by_samples = left(Rules { samples: Some(3), ..Rules::default() });
+    let by_time = left(Rules { seconds: Some(3.0 * third.seconds()), ..Rules::default() });
+    assert!((by_samples / by_time - 1.0).abs() < 1e-9, "{by_samples} s or {by_time} s");
 }
 
 /// In a room with lamps, panes, mirrors and sheets, and with roulette, so that paths end for every reason.

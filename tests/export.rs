@@ -8,7 +8,7 @@ use std::{f32::consts::PI, fs, path::Path, sync::Arc};
 use fenestra::{
     film::Image,
     scene::{
-        Scene,
+        Camera, Scene,
         export::{Settings, gltf, mitsuba::export, pbrt},
         lamp::LampKind,
         material::{Distribution, Material, MaterialKind, Surface},
@@ -17,7 +17,8 @@ use fenestra::{
     },
     surface::TextureTables,
 };
-use glam::{Vec2, Vec3};
+use glam::{Mat4, Vec2, Vec3};
+use serde_json::Value;
 
 use crate::{
     support::command::{BALL, Folder, assert_parts, yard},
@@ -97,6 +98,48 @@ fn clip_planes_stand_around_the_scene() {
         rest.split_once('"').unwrap().0.parse::<f32>().unwrap()
     });
     assert!(near < 1e-4 && (5.0..30.0).contains(&far), "{near} and {far}");
+}
+
+/// Through a lens that is shifted and mirrors, focused beyond the scene, to a wide film and to a tall one.
+#[test]
+fn cameras_come_back_as_they_were() {
+    let folder = Folder::new();
+    let lens = "vertical_fov_deg = 45.0\nshift = [0.25, -0.5]\nmirrored = true\n\
+                aperture_radius = 0.125\nfocus_distance = 500.0";
+    for size in [[8, 6], [6, 8]] {
+        let text = yard(size, "constant = [1, 1, 1]", DIFFUSE, BALL);
+        let text = text.replace("vertical_fov_deg = 45.0", lens);
+        let ours = Scene::parse(Path::new("scene.toml"), &text).unwrap();
+        let [xml, text, json] = ["a.xml", "a.pbrt", "a.gltf"].map(|name| folder.path().join(name));
+        export(&ours, &xml, SETTINGS).write().unwrap();
+        pbrt::export(&ours, &text, SETTINGS).write().unwrap();
+        gltf::export(&ours, &json).write().unwrap();
+        for path in [&xml, &text] {
+            let camera = Scene::load(path).unwrap().camera;
+            let numbers = |of: &Camera| {
+                [
+                    of.vertical_fov_deg,
+                    of.shift[0],
+                    of.shift[1],
+                    of.aperture_radius,
+                    of.focus_distance,
+                ]
+            };
+            let pairs = numbers(&camera).into_iter().zip(numbers(&ours.camera));
+            assert!(
+                pairs.into_iter().all(|(a, b)| (a / b - 1.0).abs() < 1e-4),
+                "{size:?}: {camera:?}"
+            );
+        }
+        // Mitsuba focuses between its clip planes, and glTF's axes are right-handed.
+        let text = fs::read_to_string(&xml).unwrap();
+        assert_parts(&text, &["name=\"far_clip\" value=\"1000\"", "<scale x=\"-1\"/>"]);
+        let json: Value = folder.json("a.gltf");
+        let nodes = json["nodes"].as_array().unwrap();
+        let camera = nodes.iter().find(|node| !node["camera"].is_null()).unwrap();
+        let matrix: [f32; 16] = serde_json::from_value(camera["matrix"].clone()).unwrap();
+        assert!(Mat4::from_cols_array(&matrix).determinant() > 0.9, "{matrix:?}");
+    }
 }
 
 #[test]
@@ -184,6 +227,9 @@ fn conductors_keep_their_fresnel_reflectance() {
         &xml,
         &["roughconductor", "\"eta\" value=\"0.25, 0.5, 1.5\"", "\"k\" value=\"3.5, 2.5, 2\""],
     );
+    let tinted = format!("{exact}\nreflectance = [0.5, 0.25, 1.0]");
+    let (_, xml, _) = exported("constant = [1, 1, 1]", &tinted, &[]);
+    assert_parts(&xml, &["\"specular_reflectance\" value=\"0.5, 0.25, 1\"", "\"3.5, 2.5, 2\""]);
     let schlick = "type = \"conductor\"\nalpha = 0.25\nreflectance = [1.0, 0.75, 0.5]";
     let (_, xml, messages) = exported("constant = [1, 1, 1]", schlick, &[]);
     assert_parts(&xml, &["principled", "name=\"roughness\" value=\"0.5\"", "1, 0.75, 0.5"]);
@@ -558,6 +604,14 @@ falloff = "linear_angle"
 
     let (_, _, warnings, _) = both(DIFFUSE, &lamps.replace("linear_angle", "smooth_cosine"));
     assert!(matches!(&warnings[..], [one] if one.contains("spot falls off")), "{warnings:?}");
+    let (folder, _, _, [wide, _]) = both(DIFFUSE, &lamps.replace("30.0", "120.0"));
+    gltf::export(&wide, &folder.path().join("wide.gltf")).write().unwrap();
+    let json: Value = folder.json("wide.gltf");
+    let spot = &json["extensions"]["KHR_lights_punctual"]["lights"][2]["spot"];
+    assert!(
+        (spot["outerConeAngle"].as_f64().unwrap() - f64::from(0.5 * PI)).abs() < 1e-6,
+        "{spot}"
+    );
 }
 
 #[test]

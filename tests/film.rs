@@ -531,10 +531,17 @@ fn merged_checkpoints_equal_one_run() {
     assert_eq!(device, "card + llvmpipe (LLVM 15, 256 bits) “ä”");
     assert_eq!((driver.as_str(), tracer.as_str()), ("Mesa 22.3.6", "Embree 3.13.5 + device"));
     // Half the samples are no layer of a group of lights.
-    let mut grouped = first.clone();
-    let [sum, compensation] = [first.sums.sum.clone(), first.sums.compensation.clone()];
-    let name = "key".to_owned();
-    grouped.sums.groups.push(GroupSums { name, sum, compensation, pending: Vec::new() });
+    let with_group = |part: &Checkpoint| {
+        let mut part = part.clone();
+        let [sum, compensation] = [part.sums.sum.clone(), part.sums.compensation.clone()];
+        let name = "key".to_owned();
+        part.sums.groups.push(GroupSums { name, sum, compensation, pending: Vec::new() });
+        part
+    };
+    let grouped = with_group(&first);
+    let both = merge_checkpoints(&[(a, &grouped), (b, &with_group(&second))]).unwrap().sums;
+    let GroupSums { sum, compensation, .. } = &both.groups[0];
+    assert_eq!([sum, compensation], [&both.sum, &both.compensation]);
     for parts in [[(a, &grouped), (b, &second)], [(b, &second), (a, &grouped)]] {
         assert!(merge_checkpoints(&parts).unwrap().sums.groups.is_empty());
     }

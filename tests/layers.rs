@@ -39,7 +39,7 @@ fn guided() -> Settings {
         sampler: Sampler::Guided,
         // `auto` is measured and may differ from run to run.
         parameters: Parameters { candidates: Some(1), ..Parameters::default() },
-        aovs: vec![Aov::GuideCell, Aov::Normal],
+        aovs: vec![Aov::GuideCell, Aov::Normal, Aov::Unfiltered],
         ..Settings::default()
     }
 }
@@ -320,6 +320,7 @@ fn a_sample_shows_the_cell_it_found() {
         let keys = renderer.guide_state().unwrap().unwrap().keys;
         let (sums, by_colour) = (renderer.sums().unwrap(), keys_by_colour(&keys));
         let mut found = [0; 3];
+        assert!(sums.unfiltered == sums.sum, "no light of training");
         for pixel in 0..sums.pixel_count() {
             if sums.normal[pixel] == [0.0; 3] {
                 assert_eq!(sums.guide_level[pixel], [0.0; 3], "the sky has no cell");

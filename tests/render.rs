@@ -77,8 +77,8 @@ fn what_a_file_asks_for_is_taken_where_no_option_says_otherwise() {
 fn rays_are_counted_by_kind() {
     let folder = folder();
     let pixels = 40 * 24;
-    let (_, direct) =
-        render(&folder, "out.exr", &["--spp", "4", "--sampler", "cosine", "--depth", "1"]);
+    let options = command::words("--spp 4 --sampler cosine --depth 1 --aov Visible");
+    let (image, direct) = render(&folder, "out.exr", &options);
     assert_eq!(direct.rays["camera"], 4 * pixels);
     assert_eq!(direct.rays["bounce"], 0);
     // Five where a ray meets a surface, but for those below the horizon of an interpolated normal.
@@ -86,6 +86,10 @@ fn rays_are_counted_by_kind() {
     assert!((0.5..=1.0).contains(&rays), "{rays} of all");
     let share = direct.visible_share.unwrap();
     assert!((0.5..1.0).contains(&share), "an open scene: {share}");
+    let [shares, counts] = ["Visible.Y", "ShadowRays.Y"].map(|name| &image.channels[name]);
+    let visible: f32 = shares.iter().zip(counts).map(|(share, count)| share * count).sum();
+    let found = f64::from(visible / counts.iter().sum::<f32>());
+    assert!((found / share - 1.0).abs() < 1e-4, "{found} of the layer, {share} of all");
     let (_, deep) = render(&folder, "out.exr", &["--spp", "4", "--depth", "3", "--sampler", "mis"]);
     assert!(deep.rays["bounce"] > 0 && deep.rays["shadow"] > direct.rays["shadow"] / 2);
     assert_eq!(deep.dropped_samples, 0);
@@ -132,7 +136,8 @@ fn a_render_continued_from_its_checkpoint_has_the_same_bits() {
     assert_eq!(attribute("conversion"), Attribute::Text("uint32_to_float32".into()));
     let Attribute::Text(manifest) = attribute("manifest") else { panic!("no text") };
     let names: serde_json::Map<_, _> = serde_json::from_str(&manifest).unwrap();
-    // Every identifier in the picture has a name.
+    // Every identifier in the picture has a name, and so has what a file leaves without one.
+    assert!(names.contains_key("unnamed"), "{manifest}");
     for id in part.channels["CryptoObject00.R"].iter().filter(|id| **id != 0.0) {
         let found = serde_json::Value::from(format!("{:08x}", id.to_bits()));
         assert!(names.values().any(|named| *named == found), "{found} in {manifest}");
