@@ -187,6 +187,14 @@ fn lamps_without_a_surface_light_a_plane() {
         40.0 * to_lamp.normalize().y / to_lamp.length_squared() * 0.5 / PI
     });
     assert_mean(&point, settings(Sampler::Mis, 1), 64, expected);
+    // Five centimetres above the middle of the view.
+    let mut near = scenes::plane(Vec3::splat(0.5), black());
+    near.camera.vertical_fov_deg = 0.02;
+    let above = Vec3::new(0.0, 0.05, 0.0);
+    scenes::add_lamp(&mut near, LampKind::Point { position: above, intensity });
+    let ratio =
+        mean(&near, settings(Sampler::Mis, 1)) / (40.0 / 0.05_f64.powi(2) * 0.5 / f64::from(PI));
+    assert!((ratio - 1.0).abs() < 5e-3, "{ratio}");
     for falloff in [SpotFalloff::SquaredCosine, SpotFalloff::SmoothCosine, SpotFalloff::LinearAngle]
     {
         let (inner, outer) = (0.1_f32, 0.4_f32);
@@ -311,10 +319,20 @@ fn panes_reflect_and_pass_their_tints() {
     let [reflectance, transmittance] = [Vec3::new(0.9, 0.7, 0.5), Vec3::new(0.3, 0.8, 0.6)];
     let pane = MaterialKind::ThinDielectric { ior: 1.5, reflectance, transmittance };
     let mut scene = between_sky_and_ground(pane);
-    for (opacity, is_textured) in [(1.0, false), (0.6, true)] {
-        if is_textured {
+    for (opacity, tint) in [(1.0, "material"), (0.6, "texture"), (0.8, "vertices")] {
+        if tint == "texture" {
             scene.materials[0] = tinted_by_texture(scene.materials[0].clone(), transmittance);
-            scene.geometry.uvs[0] = UVS.to_vec();
+            // The second coordinates lie on the white texel, the first on a black one.
+            scene.geometry.uvs = [0.25, 0.75].map(|u| vec![[u, 0.5]; UVS.len()]);
+            if let Some(used) = &mut scene.materials[0].surface.color {
+                let texels = Texels::Bytes(vec![[0, 0, 0, 255], [255; 4]]);
+                let texture = Texture { name: "two".into(), width: 2, height: 1, texels };
+                (used.texture, used.uv_set) = (Arc::new(texture), 1);
+            }
+        } else if tint == "vertices" {
+            let surface = &mut scene.materials[0].surface;
+            (surface.color, surface.vertex_color) = (None, true);
+            scene.geometry.colors = vec![transmittance.extend(1.0).to_array(); UVS.len()];
         }
         scene.materials[0].surface.opacity.factor = opacity;
         let opacity = f64::from(opacity);

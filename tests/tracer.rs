@@ -22,6 +22,7 @@ use crate::support::{
     command::{BALL, Folder, Run, program, yard},
     random::Random,
     rays::{ONE_PAGE, OnDevice, REFILLING, random_shadow_rays, ray},
+    scenes,
 };
 
 const SCENES: [&str; 5] = ["bathroom", "courtyard", "meeting_room", "reading_room", "restroom"];
@@ -121,9 +122,17 @@ fn picture(scene: &Scene, tracer: Tracer) -> Option<Vec<[f32; 3]>> {
     Some(renderer.sums().unwrap().sum.clone())
 }
 
-/// Cut-out leaves, panes, solid glass and textures: the same chances at surfaces that let light pass.
+/// Cut-out leaves, panes, solid glass and textures: the same chances at surfaces that let light pass. Before
+/// them, a pane with holes that fills the picture.
 #[test]
 fn host_and_device_draw_the_same_picture() {
+    let kind =
+        MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: Vec3::ONE };
+    let mut pane = Material::new("pane", kind);
+    pane.surface.opacity.factor = 0.6;
+    let mut holes = scenes::plane(Vec3::ONE, scenes::sky());
+    holes.materials = vec![pane];
+    assert_same_pictures(&holes);
     let mut scene = shipped("reading_room");
     (scene.film.width, scene.film.height) = (64, 48);
     let color = scene.materials.iter().find_map(|material| material.surface.color.clone());
@@ -132,11 +141,15 @@ fn host_and_device_draw_the_same_picture() {
     let panes = scene.materials.iter_mut().filter(is_pane);
     let tinted = panes.map(|material| material.surface.color = color.clone()).count();
     assert!(tinted > 0 && color.is_some());
-    let Some(host) = picture(&scene, Tracer::Host) else {
+    assert_same_pictures(&scene);
+}
+
+fn assert_same_pictures(scene: &Scene) {
+    let Some(host) = picture(scene, Tracer::Host) else {
         eprintln!("not tested: there is no library by which the host traces (./setup)");
         return;
     };
-    let device = picture(&scene, Tracer::Device).unwrap();
+    let device = picture(scene, Tracer::Device).unwrap();
     let sum = |pixels: &[[f32; 3]]| pixels.iter().flatten().map(|x| f64::from(*x)).sum::<f64>();
     let ratio = sum(&host) / sum(&device);
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
@@ -146,7 +159,7 @@ fn host_and_device_draw_the_same_picture() {
     };
     let same = host.iter().zip(&device).filter(is_same).count();
     assert!(same * 10 > host.len() * 9, "{same} of {} pixels are the same", host.len());
-    assert_eq!(host, picture(&scene, Tracer::Host).unwrap(), "the same seed gives the same bits");
+    assert_eq!(host, picture(scene, Tracer::Host).unwrap(), "the same seed gives the same bits");
 }
 
 fn tracer_of(folder: &Folder) -> String {
