@@ -146,6 +146,9 @@ fn metallic_roughness_materials_come_with_all_their_textures() {
     assert_eq!(found.surface.opacity, Default::default());
     let (found, _) = gltf_material(&folder, &material.replace("MASK", "BLEND"), &rest);
     assert_eq!((found.surface.opacity.factor, found.surface.opacity.cutoff), (0.9, None));
+    let never = material.replace("\"alphaCutoff\": 0.3", "\"alphaCutoff\": 1.5");
+    let (found, _) = gltf_material(&folder, &never, &rest);
+    assert_eq!((found.surface.opacity.factor, found.surface.opacity.cutoff), (0.0, Some(1.0)));
     let (found, _) = gltf_material(&folder, "{}", "");
     assert!(matches!(
         found.kind,
@@ -561,7 +564,9 @@ fn quantized_attributes_are_numbers() {
     let masked = load(r#"{"alphaMode": "MASK"}"#);
     assert_eq!(masked.colors[0], mesh.colors[0]);
     assert_eq!(masked.materials[0].material.surface.opacity.cutoff, Some(0.5));
-    assert_eq!(load("{}").colors[2], [0.0, 0.0, 0.0, 1.0], "opaque materials ignore alpha");
+    for opaque in ["{}", ""] {
+        assert_eq!(load(opaque).colors[2], [0.0, 0.0, 0.0, 1.0], "opaque: `{opaque}`");
+    }
     let bare = [
         Attribute::floats("POSITION", "VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
         Attribute::floats("COLOR_0", "VEC3", &[0.5, 0.25, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]),

@@ -207,11 +207,13 @@ impl GltfReader<'_> {
         let Reflection { kind, mut surface, alpha, .. } = reflection;
         let mode = json["alphaMode"].as_str();
         surface.opacity = match mode {
-            Some("MASK" | "BLEND") => Opacity {
-                factor: alpha,
-                texture: surface.opacity.texture,
-                cutoff: (mode == Some("MASK")).then(|| share(json, "alphaCutoff", 0.5)),
-            },
+            Some("MASK") => {
+                let cutoff = number(json, "alphaCutoff", 0.5);
+                // No opacity reaches a cutoff above 1.
+                let factor = if cutoff > 1.0 { 0.0 } else { alpha };
+                Opacity { factor, cutoff: Some(cutoff.clamp(0.0, 1.0)), ..surface.opacity }
+            }
+            Some("BLEND") => Opacity { factor: alpha, ..surface.opacity },
             _ => Opacity::default(),
         };
         let name = json["name"].as_str().unwrap_or_default().to_owned();

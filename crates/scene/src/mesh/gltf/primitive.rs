@@ -6,6 +6,7 @@ use gltf::{
     accessor::{DataType, Dimensions},
     mesh::{Mode, Semantic},
 };
+use serde_json::Value;
 
 use super::GltfReader;
 use crate::{
@@ -215,15 +216,15 @@ impl GltfReader<'_> {
         } else {
             self.attribute::<4>(primitive, &semantic, count)?
         };
-        let Some(material) = material.filter(|_| !colors.is_empty()) else { return Ok(colors) };
-        let index = primitive.material().index().unwrap_or_default();
-        let json = &self.json["materials"][index];
-        if !json["extensions"]["KHR_materials_unlit"].is_null() {
-            let place = || label("material", index, json["name"].as_str());
-            self.ignored.add(features::GLTF_UNLIT_COLOR, place);
-        }
+        let index = primitive.material().index();
+        let json = index.map_or(&Value::Null, |index| &self.json["materials"][index]);
         if !matches!(json["alphaMode"].as_str(), Some("MASK" | "BLEND")) {
             colors.iter_mut().for_each(|color| color[3] = 1.0);
+        }
+        let Some(material) = material.filter(|_| !colors.is_empty()) else { return Ok(colors) };
+        if !json["extensions"]["KHR_materials_unlit"].is_null() {
+            let place = || label("material", index.unwrap_or_default(), json["name"].as_str());
+            self.ignored.add(features::GLTF_UNLIT_COLOR, place);
         }
         self.mesh.materials[material].material.surface.vertex_color = true;
         Ok(colors)
