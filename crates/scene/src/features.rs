@@ -33,6 +33,7 @@ features! {
     GLTF_COLORS "further sets of vertex colours" "";
     GLTF_UV "third and further sets of texture coordinates" "";
     GLTF_ANIMATION "animations" "played by `--frames`; else nodes stand as the file places them";
+    GLTF_MORPH_COLORS "colours and texture coordinates of morph targets" "";
     GLTF_MORPH_ANIMATION "animated weights of morph targets" "those of the file count";
     GLTF_POINTS "points and lines" "";
     GLTF_SCENES "further scenes" "the default scene is rendered, else the first";

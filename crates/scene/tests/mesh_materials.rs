@@ -669,7 +669,7 @@ fn morph_targets_move_vertices_by_their_weights() {
     let text = text.replace("}}]}]", &format!("}}, {targets}}}], \"weights\": [0.5]}}]"));
     let of_node = text.replace(r#"[{"mesh": 0}]"#, r#"[{"mesh": 0, "weights": [0.25]}]"#);
     let folder = Folder::new();
-    for (text, weight) in [(text, 0.5), (of_node, 0.25)] {
+    for (text, weight) in [(text, 0.5), (of_node.clone(), 0.25)] {
         let mut warnings = Vec::new();
         let mesh = Mesh::read(&folder.write("a.gltf", text), &mut warnings).unwrap();
         let moved = [[0.0, 0.0, 2.0 * weight], [1.0, 0.0, 4.0 * weight], [0.0, 1.0, 0.0]];
@@ -680,6 +680,11 @@ fn morph_targets_move_vertices_by_their_weights() {
         assert!(close(along.normalize(), [x, y, z]) && sign == -1.0, "{:?}", mesh.tangents);
         assert!(warnings.is_empty(), "{warnings:?}");
     }
+    let mut warnings = Vec::new();
+    let path = folder.write("a.gltf", of_node.replace("{\"POSITION\": 1,", "{\"TEXCOORD_0\": 1,"));
+    Mesh::read(&path, &mut warnings).unwrap();
+    let expected = "ignored colours and texture coordinates of morph targets (mesh 0)";
+    assert!(matches!(&warnings[..], [one] if one.contains(expected)), "{warnings:?}");
 }
 
 #[test]

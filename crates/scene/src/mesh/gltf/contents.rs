@@ -117,7 +117,7 @@ impl GltfReader<'_> {
     /// Counts what the primitives of a mesh hold besides triangles.
     pub(super) fn ignore_in_mesh(&mut self, mesh: &gltf::Mesh) {
         let place = || label("mesh", mesh.index(), mesh.name());
-        let ignored = &mut self.ignored;
+        let (ignored, json) = (&mut self.ignored, &self.json["meshes"][mesh.index()]);
         for primitive in mesh.primitives() {
             if !matches!(
                 primitive.mode(),
@@ -133,8 +133,15 @@ impl GltfReader<'_> {
                     _ => {}
                 }
             }
+            let targets = json["primitives"][primitive.index()]["targets"].as_array();
+            let moved = targets.into_iter().flatten().filter_map(Value::as_object).flatten();
+            for (name, _) in moved {
+                if name.starts_with("COLOR_") || name.starts_with("TEXCOORD_") {
+                    ignored.add(features::GLTF_MORPH_COLORS, place);
+                }
+            }
         }
-        ignore_extensions(ignored, &self.json["meshes"][mesh.index()], &place);
+        ignore_extensions(ignored, json, &place);
     }
 
     /// Placements of a node's mesh: its own, or those of `EXT_mesh_gpu_instancing`.
