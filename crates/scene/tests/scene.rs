@@ -191,6 +191,27 @@ fn a_camera_that_is_moved_alone_keeps_its_direction() {
 }
 
 #[test]
+fn a_camera_that_is_told_whole_is_no_warning() {
+    let folder = Folder::new();
+    let path = folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let scene = Scene::load(&path).unwrap();
+    let camera = &scene.camera;
+    let mut options = LoadOptions {
+        look_from: Some(camera.position.into()),
+        look_at: Some(camera.look_at.into()),
+        vertical_fov_deg: Some(camera.vertical_fov_deg),
+        ..LoadOptions::default()
+    };
+    let lacking = |text: &String| text.contains("no perspective camera; one that frames");
+    let told = Scene::load_with(&path, &options).unwrap();
+    assert_eq!(told.hash, scene.hash);
+    let others: Vec<_> = scene.warnings.iter().filter(|text| !lacking(text)).collect();
+    assert_eq!(told.warnings.iter().collect::<Vec<_>>(), others);
+    options.vertical_fov_deg = None;
+    assert!(Scene::load_with(&path, &options).unwrap().warnings.iter().any(lacking));
+}
+
+#[test]
 fn materials_take_every_form() {
     let folder = Folder::new();
     let text = format!(

@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::{
-    Loader, MAX_FILM_SIDE, default_material,
+    LoadOptions, Loader, MAX_FILM_SIDE, default_material,
     inside::{self, View},
     objects::lacking_uvs,
 };
@@ -198,7 +198,8 @@ impl Loader<'_> {
         Ok(dropped)
     }
 
-    /// Camera inside a room, else one that sees the whole bounding sphere of the bounding box; warns of it.
+    /// Camera of the options, if these state all of it; else one inside a room, or one that sees the whole
+    /// bounding sphere of the bounding box, with a warning.
     pub(super) fn frame(
         &self,
         geometry: &Geometry,
@@ -210,6 +211,15 @@ impl Loader<'_> {
             let message = "expected triangles or a camera, found neither";
             return Err(self.error(format!("{message}{why}")));
         };
+        if let LoadOptions {
+            look_from: Some(position),
+            look_at: Some(look_at),
+            vertical_fov_deg: Some(fov),
+            ..
+        } = *self.options
+        {
+            return Ok(pinhole(position.into(), look_at.into(), Vec3::Y, fov));
+        }
         let (position, look_at, fov, does) = match inside::view(geometry, low, high) {
             Some(View { from, at }) => (from, at, INSIDE_FOV_DEG, "stands in the room"),
             None => {
