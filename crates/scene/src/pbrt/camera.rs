@@ -100,7 +100,7 @@ fn window(entity: &Entity, crop: &Crop, log: &mut Log) -> Result<(f64, [f64; 2])
             log.ignore(features::PBRT_SCREEN_WINDOW, entity.place_of("screenwindow"));
         }
     }
-    // Of the whole film, whose middle is that of the window; then of the crop.
+    // The window is that of the whole film.
     let [low, high] = crop.bounds;
     let share = (high.y - low.y) / crop.whole.y;
     let middle = (0.5 * (low + high) - 0.5 * crop.whole) / crop.whole.y;
