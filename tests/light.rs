@@ -594,4 +594,12 @@ fn the_back_of_a_one_sided_surface_is_black() {
     scenes::add_box(&mut scene.geometry, Vec3::new(0.8, 0.0, 0.0), Vec3::splat(0.1), 1);
     let beside = mean(&scene, settings(Sampler::Mis, 2));
     assert!((beside - lit).abs() < 1e-3 * lit, "{beside}, not {lit}");
+    // Of a mirror as well, whose front reflects all.
+    let mirror = Material::new("mirror", MaterialKind::Mirror { reflectance: Vec3::ONE });
+    let mut scene = scenes::convex_furnace(mirror, Vec3::ONE);
+    scene.materials[0].surface.two_sided = false;
+    let front = mean(&scene, settings(Sampler::Mis, 2));
+    scene.geometry.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    let back = mean(&scene, settings(Sampler::Mis, 2));
+    assert!((front - 1.0).abs() < 1e-3 && back < 0.9, "{front} and {back}");
 }

@@ -93,7 +93,8 @@ Scatter pane_scatter(Material material, vec3 outgoing_local, vec3 u) {
 Scatter scatter(Material material, vec3 outgoing_local, bool is_back, vec3 u) {
     if (outgoing_local.z > 0.0 && is_kind(material, MATERIAL_MIRROR)) {
         return Scatter(
-            vec3(-outgoing_local.xy, outgoing_local.z), material.reflectance, false);
+            vec3(-outgoing_local.xy, outgoing_local.z),
+            (is_back ? material.ior : 1.0) * material.reflectance, false);
     }
     if (outgoing_local.z > 0.0 && is_kind(material, MATERIAL_DIELECTRIC)) {
         return dielectric_scatter(material, outgoing_local, is_back, u);

@@ -399,7 +399,7 @@ structs! {
         /// GGX width α.
         alpha: float,
         /// Refractive index of a dielectric; for conductors 1 selects exact Fresnel, 0 Schlick;
-        /// share of metal in a principled material.
+        /// share of metal in a principled material, or of light that the back of a mirror keeps.
         ior: float,
         /// Diffuse albedo, base colour, factor of reflected light, also of an exact conductor, or reflectance
         /// at normal incidence of a Schlick conductor.

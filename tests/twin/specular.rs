@@ -178,7 +178,7 @@ pub fn scatter(material: &Material, outgoing_local: Vec3, is_back: bool, u: Vec3
     if outgoing_local.z > 0.0 && material.kind == MATERIAL_MIRROR {
         return Scatter {
             direction_local: vec3(-outgoing_local.x, -outgoing_local.y, outgoing_local.z),
-            weight: material.reflectance.into(),
+            weight: if is_back { material.ior } else { 1.0 } * Vec3::from(material.reflectance),
             is_transmitted: false,
         };
     }

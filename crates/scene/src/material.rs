@@ -76,7 +76,7 @@ pub struct Surface {
     pub emission: Option<Emission>,
     /// Group of that light, as [`Lamp::light_group`](crate::Lamp::light_group).
     pub light_group: Option<String>,
-    /// False if the back reflects nothing and lets nothing through.
+    /// False if the back reflects nothing and lets nothing through; that of glass does both.
     pub two_sided: bool,
 }
 
