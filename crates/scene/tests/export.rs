@@ -188,8 +188,176 @@ fn absorption_views_and_spots_come_back() {
     mitsuba::export(&scene, &path, SETTINGS).write().unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     assert!(text.contains("name=\"far_clip\" value=\"20000\""), "{text}");
-    let camera = Scene::load(&path).unwrap().camera;
+    // Mitsuba takes no colours above 1, and shifts no lens.
+    for part in ["\"sigma_t\" value=\"1, 0.5, 0\"", "\"scale\" value=\"4\""] {
+        assert!(text.contains(part), "{text}");
+    }
+    let read = Scene::load(&path).unwrap();
+    assert_eq!(read.materials[0].kind.absorption(), Some(Vec3::new(4.0, 2.0, 0.0)));
+    let camera = read.camera;
     assert_eq!((camera.aperture_radius, camera.focus_distance), (0.1, 1e4));
+    scene.camera.shift = [0.25, 0.5];
+    let export = mitsuba::export(&scene, &path, SETTINGS);
+    export.write().unwrap();
+    assert!(export.warnings.concat().contains("shifts no thin lens"), "{:?}", export.warnings);
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.contains("\"perspective\"") && !text.contains("aperture"), "{text}");
+}
+
+/// What light goes straight through is no vertex there and no shadow to lamps: Mitsuba's `path` has both.
+#[test]
+fn light_goes_straight_through_surfaces_in_mitsuba() {
+    let folder = Folder::new();
+    let path = folder.path().join("a.xml");
+    let diffuse = "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]";
+    let lamp = "[[lamp]]\ntype = \"point\"\nposition = [1, 2, 3]\nintensity = [4, 5, 6]";
+    for (clay, integrator) in [
+        (diffuse.to_owned(), "path"),
+        (format!("{diffuse}\nopacity = 0.5"), "volpath"),
+        ("type = \"thin_dielectric\"".to_owned(), "volpath"),
+    ] {
+        let scene = square(&folder, &format!("{clay}\n{lamp}"));
+        mitsuba::export(&scene, &path, SETTINGS).write().unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains(&format!("<integrator type=\"{integrator}\">")), "{clay}: {text}");
+        let pbrt = pbrt::export(&scene, &path, SETTINGS).warnings.concat();
+        assert_eq!(pbrt.contains("panes, which stop it"), clay.contains("thin"), "{pbrt}");
+    }
+}
+
+#[test]
+fn a_folder_of_another_format_is_named() {
+    let folder = Folder::new();
+    let scene = square(&folder, "type = \"mirror\"\nreflectance = [1, 1, 1]");
+    let [first, second] = ["a.xml", "a.pbrt"].map(|name| folder.path().join(name));
+    for _ in 0..2 {
+        let export = mitsuba::export(&scene, &first, SETTINGS);
+        assert_eq!(export.warnings, [""; 0], "it replaces itself alone");
+        export.write().unwrap();
+    }
+    let warnings = pbrt::export(&scene, &second, SETTINGS).warnings.concat();
+    assert!(warnings.contains("a.xml: its meshes and images lie in the same folder"), "{warnings}");
+}
+
+#[test]
+fn normals_of_vertices_that_point_to_the_back_are_turned() {
+    let folder = Folder::new();
+    let mut scene = square(&folder, "type = \"dielectric\"");
+    scene.geometry.normals.iter_mut().for_each(|normal| *normal = normal.map(|part| -part));
+    let path = folder.path().join("a.xml");
+    mitsuba::export(&scene, &path, SETTINGS).write().unwrap();
+    let [(_, gltf), (warnings, pbrt)] = again(&folder, &scene);
+    assert_eq!(warnings, [""; 0]);
+    for read in [Scene::load(&path).unwrap(), gltf, pbrt] {
+        let Geometry { positions, normals, triangles, .. } = &read.geometry;
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|at| Vec3::from(positions[at as usize]));
+            let front = (b - a).cross(c - a).normalize();
+            assert!(triangle.iter().all(|&at| front.dot(normals[at as usize].into()) > 0.9));
+        }
+    }
+}
+
+/// Where coordinates do not tell the directions of a normal map, a surface has none.
+#[test]
+fn normal_maps_without_coordinates_are_left_out() {
+    let folder = Folder::new();
+    let clay =
+        "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]\nnormal = { texture = \"a.png\" }";
+    let mut scene = square(&folder, clay);
+    let path = folder.path().join("a.xml");
+    for has_coordinates in [true, false] {
+        if !has_coordinates {
+            scene.geometry.uvs[0].clear();
+        }
+        mitsuba::export(&scene, &path, SETTINGS).write().unwrap();
+        let [(_, gltf), (_, pbrt)] = again(&folder, &scene);
+        for read in [Scene::load(&path).unwrap(), gltf, pbrt] {
+            assert_eq!(read.materials[0].surface.normal.is_some(), has_coordinates);
+        }
+    }
+}
+
+/// Shares are at most 1, whatever images times factors come to.
+#[test]
+fn bright_images_are_cut_off_where_shares_end() {
+    let folder = Folder::new();
+    let image = "{ texture = \"a.png\", factor = 0.5, interpolation = \"nearest\" }";
+    let clay = format!(
+        "type = \"principled\"\nbase_color = {image}\nroughness = {image}\nmetallic = {image}\n\
+         opacity = {image}"
+    );
+    let mut scene = square(&folder, &clay);
+    let [dark, bright] = [0.25, 4.0].map(half::f16::from_f32);
+    let mut brighten = |used: &mut Option<TextureUse>| {
+        let used = used.as_mut().unwrap();
+        let texels = Texels::Halves(vec![[dark; 4], [bright; 4]]);
+        used.texture = Texture { texels, ..(*used.texture).clone() }.into();
+    };
+    let Surface { color, roughness, metallic, opacity, .. } = &mut scene.materials[0].surface;
+    [color, roughness, metallic, &mut opacity.texture].into_iter().for_each(&mut brighten);
+    let path = folder.path().join("b.xml");
+    let mitsuba = mitsuba::export(&scene, &path, SETTINGS).warnings.concat();
+    assert!(mitsuba.contains("above 1 in places, where Mitsuba"), "{mitsuba}");
+    let [(warnings, gltf), _] = again(&folder, &scene);
+    let is_named = |text: &String| text.contains("above 1 in places; it is cut off");
+    assert!(warnings.len() == 4 && warnings.iter().all(is_named), "{warnings:?}");
+    let at = |used: &Option<TextureUse>, u: f32| used.as_ref().unwrap().value(Vec2::new(u, 0.5)).x;
+    for (u, expected) in [(0.25, 0.125), (0.75, 1.0)] {
+        let Surface { color, roughness, metallic, opacity, .. } = &gltf.materials[0].surface;
+        let MaterialKind::Principled(own) = gltf.materials[0].kind else { panic!() };
+        for (name, found) in [
+            ("colour", own.base_color.x * at(color, u)),
+            ("roughness", own.roughness * at(roughness, u)),
+            ("metal", own.metallic * at(metallic, u)),
+            ("opacity", opacity.factor * at(&opacity.texture, u)),
+        ] {
+            assert!((found - expected).abs() < 2e-3, "{name} at {u}: {found}, not {expected}");
+        }
+    }
+    // Light has no such bound, nor a place in `KHR_materials_unlit` above 1.
+    let clay = "type = \"diffuse\"\nreflectance = [0, 0, 0]\nemission_two_sided = true\n\
+                emission = { texture = \"a.png\", interpolation = \"nearest\" }";
+    let mut scene = square(&folder, clay);
+    brighten(&mut scene.materials[0].surface.emission.as_mut().unwrap().texture);
+    mitsuba::export(&scene, &path, SETTINGS).write().unwrap();
+    let [(_, gltf), _] = again(&folder, &scene);
+    for read in [Scene::load(&path).unwrap(), gltf] {
+        let emission = read.materials[0].surface.emission.as_ref().unwrap();
+        for (u, expected) in [(0.25, 0.25), (0.75, 4.0)] {
+            let found = emission.radiance.x * at(&emission.texture, u);
+            assert!((found - expected).abs() < 4e-3, "{found}, not {expected}");
+        }
+    }
+}
+
+#[test]
+fn what_gltf_and_plastics_of_mitsuba_cannot_say_is_named() {
+    let folder = Folder::new();
+    let warnings = |clay: &str| {
+        let [(gltf, _), (pbrt, _)] = again(&folder, &square(&folder, clay));
+        [gltf.concat(), pbrt.concat()]
+    };
+    let of_index = |index: f32| {
+        let clay = format!("type = \"dielectric\"\nior = {index}\ntwo_sided = false");
+        warnings(&clay)
+    };
+    // Glass has no back.
+    assert_eq!(of_index(1.25), ["", ""]);
+    assert!(of_index(0.8)[0].contains("refractive indices are at least 1"));
+    let [gltf, pbrt] = warnings(
+        "type = \"diffuse_transmission\"\nreflectance = [0.75, 0.25, 0]\ntransmittance = [0.25, 0.75, 0]",
+    );
+    assert!(gltf.contains("the same share of all colours") && pbrt.is_empty(), "{gltf}{pbrt}");
+
+    let clay = "type = \"plastic\"\nalpha = 0.05\ndiffuse = [0.5, 0.5, 0.5]\nvertex_color = true";
+    let mut scene = square(&folder, clay);
+    scene.geometry.colors = vec![[0.5, 0.5, 1.0, 1.0]; scene.geometry.positions.len()];
+    let path = folder.path().join("a.xml");
+    let export = mitsuba::export(&scene, &path, SETTINGS);
+    export.write().unwrap();
+    assert!(export.warnings.concat().contains("plastic has no colours of vertices"));
+    assert!(!std::fs::read_to_string(&path).unwrap().contains("mesh_attribute"));
 }
 
 #[test]

@@ -12,12 +12,15 @@ mod parts;
 pub mod pbrt;
 mod subject;
 
+use std::path::Path;
+
 use glam::Vec3;
 
 use crate::{
     Scene,
     error::Result,
     light_group::{ENVIRONMENT, LAMPS, LightGroups},
+    material::MaterialKind,
 };
 
 /// Settings of the render that are not part of the scene.
@@ -70,9 +73,18 @@ impl<'a> Export<'a> {
     }
 }
 
-/// Warnings about the portals and the groups of lights of `scene`, which no export has.
-fn left_out(scene: &Scene) -> Vec<String> {
+/// Warnings about the portals and the groups of lights of `scene`, which no export has, and about exports to
+/// other formats that the one at `path` spoils.
+fn left_out(scene: &Scene, path: &Path) -> Vec<String> {
     let mut warnings = Vec::new();
+    let others = ["xml", "pbrt", "gltf"].map(|extension| path.with_extension(extension));
+    if let Some(other) = others.iter().find(|other| *other != path && other.exists()) {
+        warnings.push(format!(
+            "{}: its meshes and images lie in the same folder as those of this export, which replace \
+             them; formats need names of their own",
+            other.display()
+        ));
+    }
     if let Some(first) = scene.portals.first() {
         let first = if first.name.is_empty() { "the first" } else { &first.name };
         warnings.push(format!(
@@ -94,6 +106,12 @@ fn left_out(scene: &Scene) -> Vec<String> {
 /// Tests for insides that absorb, for which other renderers need an integrator of their own.
 fn has_media(scene: &Scene) -> bool {
     scene.materials.iter().any(|material| material.kind.absorption().is_some())
+}
+
+/// Tests for panes, which the light of lamps goes straight through.
+fn has_panes(scene: &Scene) -> bool {
+    let is_pane = |kind: &MaterialKind| matches!(kind, MaterialKind::ThinDielectric { .. });
+    scene.materials.iter().any(|material| is_pane(&material.kind))
 }
 
 /// Number of a value in a list, to which it is added unless one `is_same`.

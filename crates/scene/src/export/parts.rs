@@ -47,22 +47,26 @@ pub(super) struct Triangles {
     pub(super) has_tangents: bool,
     /// Triangles whose bitangent is the normal × the tangent, and those with the opposite.
     pub(super) bitangents: [usize; 2],
-    /// Triangles whose normals point to the side from which they are clockwise.
-    pub(super) opposed: usize,
 }
 
-/// Divides the triangles of a scene by material.
+/// Divides the triangles of a scene by material. Normals of vertices that point to the back of a triangle are
+/// turned: in other renderers they decide on the front.
 pub(super) fn divide(scene: &Scene) -> Vec<Parts> {
     let Geometry { triangles, materials, .. } = &scene.geometry;
     let mut all = vec![Parts::default(); scene.materials.len()];
     let mut places = vec![[HashMap::new(), HashMap::new()]; all.len()];
     for (triangle, &material) in triangles.iter().zip(materials) {
-        let corners = triangle.map(|at| vertex(&scene.geometry, at as usize));
+        let mut corners = triangle.map(|at| vertex(&scene.geometry, at as usize));
         let is_flat = corners.iter().any(|corner| corner.normal == Vec3::ZERO);
+        let shading: Vec3 = corners.iter().map(|corner| corner.normal).sum();
+        let is_opposed = face(corners).dot(shading) < 0.0;
+        if is_opposed {
+            corners.iter_mut().for_each(|corner| corner.normal *= -1.0);
+        }
         let part = &mut all[material as usize].0[usize::from(is_flat)];
         let places = &mut places[material as usize][usize::from(is_flat)];
         let indices = [0, 1, 2].map(|corner| {
-            *places.entry(triangle[corner]).or_insert_with(|| {
+            *places.entry((triangle[corner], is_opposed)).or_insert_with(|| {
                 part.vertices.push(corners[corner]);
                 part.vertices.len() as u32 - 1
             })
@@ -92,7 +96,7 @@ impl Parts {
 
     pub(super) fn describe(&self, surface: &Surface) -> Triangles {
         let mut facts = Triangles::default();
-        for (part, is_flat) in self.each() {
+        for (part, _) in self.each() {
             for vertex in &part.vertices {
                 facts.has_colors |= surface.vertex_color && vertex.color != Vec4::ONE;
                 facts.has_transparency |= surface.vertex_color && vertex.color.w < 1.0;
@@ -104,8 +108,6 @@ impl Parts {
                     let sign = tangent(corners, used).w;
                     facts.bitangents[usize::from(sign < 0.0)] += usize::from(sign != 0.0);
                 }
-                let shading: Vec3 = corners.iter().map(|corner| corner.normal).sum();
-                facts.opposed += usize::from(!is_flat && face(corners).dot(shading) < 0.0);
             }
         }
         facts

@@ -121,6 +121,11 @@ impl<'a> Subject<'a> {
         Some((used, Recipe::Squared(alpha)))
     }
 
+    /// Normal map, if the coordinates of any triangle tell its directions.
+    pub(super) fn normal(&self) -> Option<&'a TextureUse> {
+        self.surface.normal.as_ref().filter(|_| self.triangles.bitangents != [0; 2])
+    }
+
     /// Image of the normal map, for the greater part of the triangles.
     pub(super) fn bumps(&mut self) -> Recipe {
         let [same, opposite] = self.triangles.bitangents;

@@ -186,8 +186,8 @@ impl Buffer {
 /// Channels of an image, and the meaning of its one or two textures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Layout {
-    /// sRGB colours over these largest values; opacity in the fourth channel.
-    ColorOpacity(Vec3),
+    /// sRGB colours; opacity in the fourth channel.
+    ColorOpacity,
     /// Roughness in green, metallic share in blue, both linear.
     RoughnessMetal,
     /// Components of vectors, linear.
@@ -199,6 +199,8 @@ pub(super) enum Layout {
 pub(super) struct Sheet {
     pub(super) layout: Layout,
     pub(super) uses: [Option<TextureUse>; 2],
+    /// Values of both that the file stores as 1; larger ones too.
+    pub(super) peaks: [Vec3; 2],
 }
 
 impl Sheet {
@@ -207,7 +209,8 @@ impl Sheet {
             (Arc::as_ptr(&used.texture), used.channels, used.encoding, used.scale, used.bias)
         };
         let all = |sheet: &Self| sheet.uses.each_ref().map(|used| used.as_ref().map(texels));
-        self.layout == other.layout && all(self) == all(other)
+        let rest = |sheet: &Self| (sheet.layout, sheet.peaks);
+        rest(self) == rest(other) && all(self) == all(other)
     }
 
     fn sources(&self) -> impl Iterator<Item = &TextureUse> {
@@ -238,10 +241,11 @@ impl Sheet {
             values.as_ref().map_or(Vec3::ONE, |values| Vec3::from_slice(&values[index][..3]))
         };
         let texel = |index: usize| {
-            let (first, second) = (color(&first, index), color(&second, index));
+            let first = color(&first, index) / self.peaks[0];
+            let second = color(&second, index) / self.peaks[1];
             match self.layout {
-                Layout::ColorOpacity(peak) => {
-                    let encoded = (first / peak).clamp(Vec3::ZERO, Vec3::ONE).map(srgb_from_linear);
+                Layout::ColorOpacity => {
+                    let encoded = first.clamp(Vec3::ZERO, Vec3::ONE).map(srgb_from_linear);
                     encoded.extend(luminance(second).clamp(0.0, 1.0)).to_array()
                 }
                 Layout::RoughnessMetal => {

@@ -35,7 +35,7 @@ impl<'a> Translator<'a> {
         } else {
             self.core()
         };
-        if !surface.two_sided {
+        if !surface.two_sided && !self.subject.material.kind.is_glass() {
             self.subject
                 .warn("its back is black in Fenestra, and seen or culled by readers of glTF");
         }
@@ -49,8 +49,8 @@ impl<'a> Translator<'a> {
         if let Some(emission) = surface.emission.as_ref().filter(|_| !is_unlit) {
             self.emission(emission);
         }
-        let normal = surface.normal.as_ref().filter(|_| !is_unlit);
-        if let Some(mut info) = self.texture(Layout::Vector, [normal, None]) {
+        let normal = self.subject.normal().filter(|_| !is_unlit);
+        if let Some(mut info) = self.texture(Layout::Vector, [normal, None], [Vec3::ONE; 2]) {
             if surface.normal_scale != 1.0 {
                 info["scale"] = json!(surface.normal_scale);
             }
@@ -74,7 +74,10 @@ impl<'a> Translator<'a> {
         let surface = self.subject.surface;
         let is_black =
             matches!(self.subject.material.kind, MaterialKind::Diffuse { reflectance: Vec3::ZERO });
-        let is_shown = |light: &Emission| light.two_sided && light.radiance.max_element() <= 1.0;
+        let is_shown = |light: &Emission| {
+            let largest = light.radiance * peak(light.texture.as_ref());
+            light.two_sided && largest.max_element() <= 1.0
+        };
         is_black && surface.emission.as_ref().is_some_and(is_shown) && !surface.vertex_color
     }
 
@@ -86,13 +89,20 @@ impl<'a> Translator<'a> {
             MaterialKind::DiffuseTransmission { reflectance, transmittance } => {
                 let (kept, passed) = (reflectance.max_element(), transmittance.max_element());
                 let share = if passed > 0.0 { passed / (kept + passed) } else { 0.0 };
+                if kept + passed > 1.0 + 1e-5 {
+                    self.subject.warn(
+                        "in glTF the same share of all colours goes through; those that do more than \
+                         others are darker",
+                    );
+                }
                 let color = (*transmittance / share.max(f32::MIN_POSITIVE)).min(Vec3::ONE);
                 let mut sheet = json!({"diffuseTransmissionFactor": share});
                 let texture = self.subject.surface.color.as_ref();
-                let largest = peak(texture);
+                let largest = self.peak_of_share(texture, color);
                 sheet["diffuseTransmissionColorFactor"] =
                     json!((color * largest).min(Vec3::ONE).to_array());
-                if let Some(info) = self.texture(Layout::ColorOpacity(largest), [texture, None]) {
+                let (layout, peaks) = (Layout::ColorOpacity, [largest, Vec3::ONE]);
+                if let Some(info) = self.texture(layout, [texture, None], peaks) {
                     sheet["diffuseTransmissionColorTexture"] = info;
                 }
                 self.extension("KHR_materials_diffuse_transmission", sheet);
@@ -166,7 +176,9 @@ impl<'a> Translator<'a> {
         let Anisotropy { strength, rotation, direction } = &self.subject.surface.anisotropy;
         if *strength > 0.0 {
             let mut model = json!({"anisotropyStrength": strength, "anisotropyRotation": rotation});
-            if let Some(info) = self.texture(Layout::Vector, [direction.as_ref(), None]) {
+            if let Some(info) =
+                self.texture(Layout::Vector, [direction.as_ref(), None], [Vec3::ONE; 2])
+            {
                 model["anisotropyTexture"] = info;
             }
             self.extension("KHR_materials_anisotropy", model);
@@ -199,7 +211,10 @@ impl<'a> Translator<'a> {
         if reflectance != Vec3::ONE {
             self.subject.warn("the factor of its reflected light has no place in glTF's glass");
         }
-        self.dielectric(ior, 1.0, Vec3::ONE);
+        if ior < 1.0 {
+            self.subject.warn("glTF's refractive indices are at least 1; its own is below");
+        }
+        self.dielectric(ior.max(1.0), 1.0, Vec3::ONE);
         self.extension("KHR_materials_transmission", json!({"transmissionFactor": 1.0}));
         core(transmittance, 0.0, roughness)
     }
@@ -207,23 +222,36 @@ impl<'a> Translator<'a> {
     /// `pbrMetallicRoughness`, with the textures of colour and opacity, roughness and metal.
     fn pbr(&mut self, core: &Principled, color: Option<&TextureUse>) {
         let surface = self.subject.surface;
-        let largest = peak(color);
-        let base_color = (core.base_color * largest).clamp(Vec3::ZERO, Vec3::ONE);
-        let opacity = surface.opacity.factor;
+        let mut number = |used, factor| self.peak_of_share(used, Vec3::splat(factor)).max_element();
+        let [opacity, roughness, metallic] =
+            [&surface.opacity.texture, &surface.roughness, &surface.metallic].map(Option::as_ref);
+        let opaque = Vec3::splat(number(opacity, surface.opacity.factor));
+        let gloss = [number(roughness, core.roughness), number(metallic, core.metallic)];
+        let largest = [self.peak_of_share(color, core.base_color), opaque];
+        let base_color = (core.base_color * largest[0]).clamp(Vec3::ZERO, Vec3::ONE);
         let mut pbr = json!({
-            "baseColorFactor": base_color.extend(opacity).to_array(),
-            "metallicFactor": core.metallic,
-            "roughnessFactor": core.roughness,
+            "baseColorFactor": base_color.extend(surface.opacity.factor * largest[1].x).to_array(),
+            "metallicFactor": core.metallic * gloss[1],
+            "roughnessFactor": core.roughness * gloss[0],
         });
-        let pair = [color, surface.opacity.texture.as_ref()];
-        if let Some(info) = self.texture(Layout::ColorOpacity(largest), pair) {
+        if let Some(info) = self.texture(Layout::ColorOpacity, [color, opacity], largest) {
             pbr["baseColorTexture"] = info;
         }
-        let pair = [surface.roughness.as_ref(), surface.metallic.as_ref()];
-        if let Some(info) = self.texture(Layout::RoughnessMetal, pair) {
+        let gloss = gloss.map(Vec3::splat);
+        if let Some(info) = self.texture(Layout::RoughnessMetal, [roughness, metallic], gloss) {
             pbr["metallicRoughnessTexture"] = info;
         }
         self.members["pbrMetallicRoughness"] = pbr;
+    }
+
+    /// Largest value of a texture by channel, at least 1, as far as `factor` times it is at most 1.
+    fn peak_of_share(&mut self, used: Option<&TextureUse>, factor: Vec3) -> Vec3 {
+        let (largest, most) = (peak(used), factor.recip());
+        if largest.cmpgt(most).any() {
+            self.subject
+                .warn("an image is above 1 in places; it is cut off at its texels, not between");
+        }
+        largest.min(most)
     }
 
     /// Reference to an image of one or two textures. Two must lie in the same way on the surface and
@@ -232,6 +260,7 @@ impl<'a> Translator<'a> {
         &mut self,
         layout: Layout,
         [first, second]: [Option<&TextureUse>; 2],
+        peaks: [Vec3; 2],
     ) -> Option<Value> {
         let used = first.or(second)?;
         let place = |used: &TextureUse| {
@@ -242,14 +271,14 @@ impl<'a> Translator<'a> {
         if second.is_some() && kept.is_none() {
             let [first, second] = match layout {
                 Layout::RoughnessMetal => ["roughness", "metal"],
-                Layout::ColorOpacity(_) | Layout::Vector => ["colour", "opacity"],
+                Layout::ColorOpacity | Layout::Vector => ["colour", "opacity"],
             };
             self.subject.warn(&format!(
                 "its textures of {first} and {second} lie on the surface in two ways or differ in \
                  size; glTF has one image for both, and that of {second} is left out"
             ));
         }
-        let sheet = Sheet { layout, uses: [first.cloned(), kept.cloned()] };
+        let sheet = Sheet { layout, uses: [first.cloned(), kept.cloned()], peaks };
         let (info, is_exact) = self.textures.add(sheet, used);
         if !is_exact {
             self.subject.warn(
@@ -269,8 +298,8 @@ impl<'a> Translator<'a> {
             let value = json!({"emissiveStrength": strength});
             self.extension("KHR_materials_emissive_strength", value);
         }
-        let layout = Layout::ColorOpacity(largest);
-        if let Some(info) = self.texture(layout, [emission.texture.as_ref(), None]) {
+        let (pair, peaks) = ([emission.texture.as_ref(), None], [largest, Vec3::ONE]);
+        if let Some(info) = self.texture(Layout::ColorOpacity, pair, peaks) {
             self.members["emissiveTexture"] = info;
         }
     }

@@ -63,7 +63,7 @@ pub fn export<'a>(scene: &'a Scene, path: &Path) -> Export<'a> {
     if !lights.is_empty() {
         textures.extensions.insert("KHR_lights_punctual");
     }
-    warnings.extend(left_out(scene));
+    warnings.extend(left_out(scene, path));
     let rotation_deg = scene.environment.rotation_rad.to_degrees();
     warnings.push(format!(
         "environment: glTF has none; render with `--environment {}/{ENVIRONMENT} \

@@ -26,7 +26,7 @@ use self::models::{Model, Translator, indented, interior, property, rgb};
 use super::{
     Export, Settings,
     folder::{Folder, identifier},
-    has_media,
+    has_media, has_panes,
     images::Pictures,
     left_out,
     parts::{self, Parts},
@@ -38,6 +38,7 @@ use crate::{
     error::Result,
     files,
     lamp::{LampKind, SpotFalloff},
+    material::Opacity,
 };
 
 /// Distance of a mesh that emits backwards from the one that emits forwards, as a part of the size of
@@ -56,7 +57,14 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
     });
     let models: Vec<Model> = models.collect();
     let lamps: String = scene.lamps.iter().map(|lamp| emitter_of(lamp, &mut warnings)).collect();
-    warnings.extend(left_out(scene));
+    if scene.camera.aperture_radius > 0.0 && scene.camera.shift != [0.0; 2] {
+        let difference = "Mitsuba shifts no thin lens; all distances are in focus";
+        warnings.push(format!("camera: {difference}"));
+    }
+    // To `path`, surfaces that light goes straight through count as vertices, and lamps do not shine through.
+    let has_holes = scene.materials.iter().any(|own| own.surface.opacity != Opacity::default());
+    let is_passed = has_holes || has_panes(scene) || has_media(scene);
+    warnings.extend(left_out(scene, path));
     let path = path.to_owned();
     Export::new(warnings, move || {
         let mut xml = format!(
@@ -65,7 +73,7 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
              <integer name=\"max_depth\" value=\"{}\"/>\n        \
              <boolean name=\"hide_emitters\" value=\"false\"/>\n    </integrator>\n",
             env!("CARGO_PKG_VERSION"),
-            if has_media(scene) { "volpath" } else { "path" },
+            if is_passed { "volpath" } else { "path" },
             // Mitsuba counts the edges of a path, the one to the light included.
             u64::from(settings.depth) + 1
         );
@@ -115,17 +123,18 @@ fn sensor(scene: &Scene, parts: &[Parts], samples: u32) -> String {
     let corner = parts::bounds(parts)
         .map_or(0.0, |[low, high]| (low - position).abs().max((high - position).abs()).length());
     let far = 2.0 * corner.max(1e-3);
-    let kind = if aperture_radius > 0.0 { "thinlens" } else { "perspective" };
+    let has_lens = aperture_radius > 0.0 && shift == [0.0; 2];
+    let kind = if has_lens { "thinlens" } else { "perspective" };
     let mut xml = format!("    <sensor type=\"{kind}\">\n");
     let mut number = |name, value: f32| xml += &indented(&property("float", name, value));
     number("fov", vertical_fov_deg);
-    if aperture_radius > 0.0 {
+    if has_lens {
         number("aperture_radius", aperture_radius);
         number("focus_distance", focus_distance);
     }
     number("near_clip", 1e-6 * far);
     // The plane of focus lies between the clip planes.
-    number("far_clip", if aperture_radius > 0.0 { far.max(2.0 * focus_distance) } else { far });
+    number("far_clip", if has_lens { far.max(2.0 * focus_distance) } else { far });
     let FilmSettings { width, height, filter } = scene.film;
     if shift != [0.0; 2] {
         number("principal_point_offset_x", shift[0] * height as f32 / width as f32);

@@ -56,10 +56,10 @@ impl Translator<'_> {
         let mut bsdf = self.reflection();
         if surface.two_sided && !has_sides {
             bsdf = around("twosided", "", &bsdf);
-        } else if !surface.two_sided && has_sides {
+        } else if !surface.two_sided && has_sides && !is_glass {
             self.subject.warn("its back is black in Fenestra alone");
         }
-        if let Some(normal) = &surface.normal {
+        if let Some(normal) = self.subject.normal() {
             bsdf = self.bumps(normal, &bsdf);
         }
         if let Some(opacity) = self.opacity() {
@@ -239,9 +239,18 @@ impl Translator<'_> {
                     "Mitsuba multiplies no texture by the colours of vertices; they are left out",
                 );
             }
+            let is_bright =
+                |value: &[f32; 4]| (Vec3::from_slice(value) * factor).max_element() > 1.0;
+            if used.values().iter().any(is_bright) {
+                self.subject
+                    .warn("its image is above 1 in places, where Mitsuba does not cut it off");
+            }
             return self.bitmap(name, used, Recipe::Color(factor));
         }
-        if is_of_vertices {
+        let is_plastic = matches!(self.subject.material.kind, MaterialKind::Plastic { .. });
+        if is_of_vertices && is_plastic {
+            self.subject.warn("Mitsuba's plastic has no colours of vertices; they are left out");
+        } else if is_of_vertices {
             self.color_factor = Some(factor);
             let content = property("string", "name", "vertex_color");
             return texture("mesh_attribute", name, &content);
@@ -387,7 +396,10 @@ fn around(kind: &str, content: &str, bsdf: &str) -> String {
 /// Medium inside a dielectric that absorbs.
 pub(super) fn interior(kind: &MaterialKind) -> String {
     let Some(absorption) = kind.absorption() else { return String::new() };
-    let content = rgb("sigma_t", absorption) + &float("albedo", 0.0);
+    // Colours are at most 1, times a scale.
+    let scale = absorption.max_element();
+    let content =
+        rgb("sigma_t", absorption / scale) + &float("scale", scale) + &float("albedo", 0.0);
     format!("<medium name=\"interior\" type=\"homogeneous\">\n{content}</medium>\n")
 }
 

@@ -57,19 +57,11 @@ impl<'a> Translator<'a> {
             self.subject
                 .warn("pbrt has no colours of vertices; theirs and their opacity are left out");
         }
-        if !surface.two_sided {
+        if !surface.two_sided && !self.subject.material.kind.is_glass() {
             self.subject.warn("its back is black in Fenestra, and as the front in pbrt");
         }
-        let has_inside = matches!(self.subject.material.kind, MaterialKind::Dielectric { .. });
-        if self.subject.triangles.opposed > 0 && (has_inside || surface.emission.is_some()) {
-            let count = self.subject.triangles.opposed;
-            self.subject.warn(&format!(
-                "{count} triangles have normals of vertices that point to their back, which is the \
-                 front in pbrt"
-            ));
-        }
         let (kind, mut parameters) = self.reflection();
-        if let Some(normal) = &surface.normal {
+        if let Some(normal) = self.subject.normal() {
             parameters += &self.bumps(normal);
         }
         let alpha = self.alpha();

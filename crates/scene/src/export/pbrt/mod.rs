@@ -22,7 +22,7 @@ use self::materials::{Model, Translator, rgb};
 use super::{
     Export, Settings,
     folder::{Folder, identifier},
-    has_media,
+    has_media, has_panes,
     images::Pictures,
     left_out, parts,
     subject::Subject,
@@ -54,7 +54,10 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
     });
     let models: Vec<Model> = models.collect();
     let lamps: String = scene.lamps.iter().map(|lamp| light_source(lamp, &mut warnings)).collect();
-    warnings.extend(left_out(scene));
+    if !scene.lamps.is_empty() && has_panes(scene) {
+        warnings.push("lamps: their light goes through panes, which stop it in pbrt".to_owned());
+    }
+    warnings.extend(left_out(scene, path));
     let path = path.to_owned();
     Export::new(warnings, move || {
         let mut text = format!("# Written by Fenestra {}.\n", env!("CARGO_PKG_VERSION"));
