@@ -42,7 +42,6 @@ bool goes_through(uint path) {
     vec3 normal = front_normal(triangle, instance);
     Passing shares = passing(triangle, instance, weights, to_local(bvh_frame, normal));
     float passed = dot(shares.passed, LUMINANCE_WEIGHTS);
-    float stopped = dot(shares.stopped, LUMINANCE_WEIGHTS);
     if (passed <= 0.0) {
         return false;
     }
@@ -50,9 +49,9 @@ bool goes_through(uint path) {
     uint bits = hash_4d(uvec4(
         index.pixel, index.sample_index, vertex_dimension() + DIMENSION_PASSAGE,
         wave.seed ^ hash_4d(uvec4(triangle, HAS_INSTANCES ? instance : 0u, 0u, 0u)).x)).x;
-    float probability = passed / (passed + stopped);
+    float probability = passed / (passed + shares.kept);
     bool goes_on = unit_float(bits) < probability;
-    vec3 weight = goes_on ? shares.passed / probability : shares.stopped / (1.0 - probability);
+    vec3 weight = goes_on ? shares.passed / probability : vec3(shares.met / (1.0 - probability));
     paths[path].throughput *= weight;
     if (goes_on) {
         bvh_passed_distance = bvh_distance;

@@ -314,7 +314,7 @@ fn tinted_by_texture(mut glass: Material, tint: Vec3) -> Material {
 }
 
 #[test]
-fn panes_reflect_and_pass_their_tints() {
+fn panes_reflect_and_pass_their_tints_and_emit_all_of_their_light() {
     let _alone = support::alone();
     let [reflectance, transmittance] = [Vec3::new(0.9, 0.7, 0.5), Vec3::new(0.3, 0.8, 0.6)];
     let pane = MaterialKind::ThinDielectric { ior: 1.5, reflectance, transmittance };
@@ -322,6 +322,9 @@ fn panes_reflect_and_pass_their_tints() {
     for (opacity, tint) in [(1.0, "material"), (0.6, "texture"), (0.8, "vertices")] {
         if tint == "texture" {
             scene.materials[0] = tinted_by_texture(scene.materials[0].clone(), transmittance);
+            let radiance = Vec3::new(0.5, 1.0, 0.25);
+            let emission = Emission { radiance, texture: None, two_sided: true };
+            scene.materials[0].surface.emission = Some(emission);
             // The second coordinates lie on the white texel, the first on a black one.
             scene.geometry.uvs = [0.25, 0.75].map(|u| vec![[u, 0.5]; UVS.len()]);
             if let Some(used) = &mut scene.materials[0].surface.color {
@@ -335,11 +338,14 @@ fn panes_reflect_and_pass_their_tints() {
             scene.geometry.colors = vec![transmittance.extend(1.0).to_array(); UVS.len()];
         }
         scene.materials[0].surface.opacity.factor = opacity;
+        let light = scene.materials[0].surface.emission.as_ref();
+        let light = light.map_or(Vec3::ZERO, |own| own.radiance).as_dvec3();
         let opacity = f64::from(opacity);
         assert_channels(&format!("opacity {opacity}"), &scene, 512, 0.03, |cosine| {
             let passed = pane_transmittance(cosine) * opacity;
             (opacity - passed) * (reflectance * SKY).as_dvec3()
                 + (passed * transmittance.as_dvec3() + (1.0 - opacity)) * GROUND.as_dvec3()
+                + opacity * light
         });
     }
 }
@@ -594,7 +600,7 @@ fn the_back_of_a_one_sided_surface_is_black() {
     scenes::add_box(&mut scene.geometry, Vec3::new(0.8, 0.0, 0.0), Vec3::splat(0.1), 1);
     let beside = mean(&scene, settings(Sampler::Mis, 2));
     assert!((beside - lit).abs() < 1e-3 * lit, "{beside}, not {lit}");
-    // Of a mirror as well, whose front reflects all.
+    // So is that of a mirror, whose front reflects all.
     let mirror = Material::new("mirror", MaterialKind::Mirror { reflectance: Vec3::ONE });
     let mut scene = scenes::convex_furnace(mirror, Vec3::ONE);
     scene.materials[0].surface.two_sided = false;

@@ -86,9 +86,10 @@ vec3 specular_factor(
     out vec3 direction) {
     Scatter scattered;
     if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
-        // trace.comp has let the rest through, and weighed the path by what a pane reflects.
-        scattered =
-            Scatter(vec3(-outgoing_local.xy, outgoing_local.z), vec3(1.0), false);
+        // trace.comp has let the rest through, by the geometric normal.
+        float cosine = abs(dot(hit.geometric_normal, rays[path].direction));
+        scattered = Scatter(
+            vec3(-outgoing_local.xy, outgoing_local.z), pane_reflectance(material, cosine), false);
     } else {
         bool is_behind = is_back(hit.triangle, load_hit_instance(path), rays[path].direction);
         scattered = scatter(material, outgoing_local, is_behind, u);

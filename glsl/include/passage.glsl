@@ -10,8 +10,10 @@
 struct Passing {
     // Share that goes straight through.
     vec3 passed;
-    // Share that a pane reflects; of other surfaces, the share that meets them.
-    vec3 stopped;
+    // Share that meets the surface.
+    float met;
+    // As much of it as counts for the chance to go on: of a pane that emits nothing, what it reflects.
+    float kept;
 };
 
 Passing passing(uint triangle, uint instance, vec3 weights, vec3 normal) {
@@ -20,14 +22,16 @@ Passing passing(uint triangle, uint instance, vec3 weights, vec3 normal) {
     Attributes attributes = triangle_attributes(triangle, weights);
     float opacity = surface_opacity(surface, attributes);
     Material material = load_material(index);
-    Passing shares = Passing(vec3(1.0 - opacity), vec3(opacity));
+    Passing shares = Passing(vec3(1.0 - opacity), opacity, opacity);
     if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
         if (HAS_TINTED_PANES) {
             material.eta = clamp(material.eta * surface_color(surface, attributes), 0.0, 1.0);
         }
         float cosine = abs(normal.z) / max(length(normal), 1.0e-37);
         shares.passed += opacity * pane_transmittance(material, cosine);
-        shares.stopped = opacity * pane_reflectance(material, cosine);
+        if (surface.emission_radiance == vec3(0.0)) {
+            shares.kept = opacity * dot(pane_reflectance(material, cosine), LUMINANCE_WEIGHTS);
+        }
     }
     return shares;
 }

@@ -127,8 +127,10 @@ impl Words for Pages<'_> {
 pub(super) struct Passing {
     /// Share that goes straight through.
     pub(super) passed: Vec3,
-    /// Share that a pane reflects; of other surfaces, the share that meets them.
-    stopped: Vec3,
+    /// Share that meets the surface.
+    met: f32,
+    /// As much of it as counts for the chance to go on: of a pane that emits nothing, what it reflects.
+    kept: f32,
 }
 
 /// [`Passages`] with their words at hand.
@@ -164,7 +166,7 @@ impl OpenPassages<'_> {
         let color = attributes.color(met.triangle, weights);
         let opacity = surface_opacity(&self.textures, &of.uses, surface, uvs, color.w);
         let mut shares =
-            Passing { passed: Vec3::splat(1.0 - opacity), stopped: Vec3::splat(opacity) };
+            Passing { passed: Vec3::splat(1.0 - opacity), met: opacity, kept: opacity };
         if of.materials[index as usize].kind == MATERIAL_THIN_DIELECTRIC {
             let mut material = of.materials[index as usize];
             let factor = surface_color(&self.textures, &of.uses, surface, uvs, color.truncate());
@@ -174,7 +176,9 @@ impl OpenPassages<'_> {
             let normal = (b - a).cross(c - a);
             let cosine = normal.z.abs() / normal.length().max(1e-37);
             shares.passed += opacity * pane_transmittance(&material, cosine);
-            shares.stopped = opacity * pane_reflectance(&material, cosine);
+            if surface.emission_radiance == [0.0; 3] {
+                shares.kept = opacity * luminance(pane_reflectance(&material, cosine));
+            }
         }
         shares
     }
@@ -221,7 +225,7 @@ impl<'a> Chances<'a> {
     /// Decides whether the ray of a path goes through a surface that it has met, as `goes_through` in
     /// `trace.comp`. Returns that, and the weight of the path if the decision counts.
     pub(super) fn take(&self, path: u32, met: &Meeting, shares: &Passing) -> (bool, Vec3) {
-        let (passed, stopped) = (luminance(shares.passed), luminance(shares.stopped));
+        let passed = luminance(shares.passed);
         if passed <= 0.0 {
             return (false, Vec3::ONE);
         }
@@ -231,11 +235,11 @@ impl<'a> Chances<'a> {
         let dimension = DIMENSION_VERTEX + wave.vertex * DIMENSIONS_PER_VERTEX + DIMENSION_PASSAGE;
         let seed = wave.seed ^ hash_4d([met.triangle, instance, 0, 0])[0];
         let [bits, ..] = hash_4d([pixel, sample, dimension, seed]);
-        let probability = passed / (passed + stopped);
+        let probability = passed / (passed + shares.kept);
         if unit_float(bits) < probability {
             (true, shares.passed / probability)
         } else {
-            (false, shares.stopped / (1.0 - probability))
+            (false, Vec3::splat(shares.met / (1.0 - probability)))
         }
     }
 }

@@ -204,7 +204,8 @@ fn absorption_views_and_spots_come_back() {
     assert!(text.contains("\"perspective\"") && !text.contains("aperture"), "{text}");
 }
 
-/// What light goes straight through is no vertex there and no shadow to lamps: Mitsuba's `path` has both.
+/// Surfaces that light goes straight through are no vertices there, and no shadow to lamps: Mitsuba's `path`
+/// has both.
 #[test]
 fn light_goes_straight_through_surfaces_in_mitsuba() {
     let folder = Folder::new();
