@@ -141,9 +141,9 @@ pub(crate) const GGX_WORDS: usize = (DIFFUSE_RISE_OFFSET + BRDF_COSINE_NODES) as
 /// `GGX_ROUGHNESS_WORDS` and `DIFFUSE_RISE_OFFSET`. Computed once a process, by one thread: one that
 /// waits for others in here could be given work that waits for it.
 pub(crate) fn ggx_words(is_beckmann: bool) -> &'static [u32] {
-    static GGX: LazyLock<Vec<u32>> = LazyLock::new(|| schlick_words(false));
-    static BECKMANN: LazyLock<Vec<u32>> = LazyLock::new(|| schlick_words(true));
-    if is_beckmann { &BECKMANN } else { &GGX }
+    static WORDS: [LazyLock<Vec<u32>>; 2] =
+        [LazyLock::new(|| schlick_words(false)), LazyLock::new(|| schlick_words(true))];
+    &WORDS[usize::from(is_beckmann)]
 }
 
 fn schlick_words(is_beckmann: bool) -> Vec<u32> {

@@ -133,7 +133,7 @@ impl MaterialTables {
                 MaterialKind::Mirror { reflectance } => {
                     converted.kind = MATERIAL_MIRROR;
                     converted.reflectance = reflectance.to_array();
-                    converted.ior = f32::from(u8::from(material.surface.two_sided));
+                    converted.ior = f32::from(material.surface.two_sided);
                 }
                 MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption } => {
                     converted.kind = MATERIAL_DIELECTRIC;

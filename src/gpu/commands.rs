@@ -98,7 +98,7 @@ impl Commands {
     /// Binds those of `sets` that the shader uses; `push_constants` may be empty.
     ///
     /// # Errors
-    /// [`Error::Vulkan`](crate::Error::Vulkan) if a call fails.
+    /// [`Error::Vulkan`] if a call fails.
     ///
     /// # Panics
     /// If the dispatch exceeds the device's workgroup count or the push constants exceed 128 bytes.

@@ -28,10 +28,13 @@ fn vulkan_format(format: TexelFormat) -> vk::Format {
     }
 }
 
+/// A descriptor set and the pool that it has for itself.
+type Seen = (vk::DescriptorPool, vk::DescriptorSet);
+
 /// Buffers at the bindings of a table, and a descriptor set with its own pool for each choice of them that a
 /// shader has used.
 pub struct DescriptorSet {
-    seen: Mutex<HashMap<Arc<[u32]>, (vk::DescriptorPool, vk::DescriptorSet)>>,
+    seen: Mutex<HashMap<Arc<[u32]>, Seen>>,
     /// Buffers with their views as texels.
     buffers: Vec<(Binding, Buffer, vk::BufferView)>,
     table: &'static BindingTable,
