@@ -238,6 +238,10 @@ fn a_folder_of_another_format_is_named() {
     }
     let warnings = pbrt::export(&scene, &second, SETTINGS).warnings.concat();
     assert!(warnings.contains("a.xml: its meshes and images lie in the same folder"), "{warnings}");
+    // A scene of someone else's, with no such folder, loses nothing.
+    let alone = folder.write("b.xml", "<scene/>").with_extension("gltf");
+    let warnings = gltf::export(&scene, &alone).warnings.concat();
+    assert!(!warnings.contains("b.xml"), "{warnings}");
 }
 
 #[test]

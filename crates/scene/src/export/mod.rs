@@ -12,7 +12,7 @@ mod parts;
 pub mod pbrt;
 mod subject;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
@@ -78,7 +78,9 @@ impl<'a> Export<'a> {
 fn left_out(scene: &Scene, path: &Path) -> Vec<String> {
     let mut warnings = Vec::new();
     let others = ["xml", "pbrt", "gltf"].map(|extension| path.with_extension(extension));
-    if let Some(other) = others.iter().find(|other| *other != path && other.exists()) {
+    let is_export =
+        |other: &&PathBuf| *other != path && other.exists() && other.with_extension("").is_dir();
+    if let Some(other) = others.iter().find(is_export) {
         warnings.push(format!(
             "{}: its meshes and images lie in the same folder as those of this export, which replace \
              them; formats need names of their own",
