@@ -1,6 +1,6 @@
 // Lamps: emitting triangles, and lights without a surface. Clusters of them are drawn from the list of the
 // place, those of a cluster in proportion to their power, triangles uniformly over their area. Twin of
-// src/pass/lamps.rs and lamp_cells.rs for the densities.
+// src/pass/lamps.rs and lamp_cells for the densities.
 
 #include "bvh.glsl"
 #include "emission.glsl"
