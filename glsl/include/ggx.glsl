@@ -88,9 +88,10 @@ float masked_length(vec3 direction, GgxWidth width) {
         return ggx_stretched_length(direction, width);
     }
     float cosine = abs(direction.z);
-    float a = cosine / max(length(ggx_stretched(direction, width).xy), 1e-30);
-    float masked = (1.0 - 1.259 * a + 0.396 * a * a) / (3.535 * a + 2.181 * a * a);
-    return a < 1.6 ? cosine + 2.0 * cosine * masked : cosine;
+    float tangential = length(ggx_stretched(direction, width).xy);
+    float a = cosine / max(tangential, 1e-30);
+    float masked = tangential * (1.0 - 1.259 * a + 0.396 * a * a) / (3.535 + 2.181 * a);
+    return a < 1.6 ? cosine + 2.0 * masked : cosine;
 }
 
 // Lower end of the spherical cap of bounded sampling, as a factor. [Eto & Tokuyoshi 2023] Eq. 5.

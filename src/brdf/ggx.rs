@@ -6,9 +6,12 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, vec2, vec3};
 
-use crate::shader::{
-    constants::{MATERIAL_COATED, MATERIAL_SHEEN},
-    structs::Material,
+use crate::{
+    scene::coat::beckmann_length,
+    shader::{
+        constants::{MATERIAL_COATED, MATERIAL_SHEEN},
+        structs::Material,
+    },
 };
 
 /// Smallest GGX width: single-precision directions cannot resolve a narrower lobe.
@@ -95,16 +98,14 @@ pub fn ggx_stretched_length(direction: Vec3, width: GgxWidth) -> f32 {
     width.stretched(direction).length()
 }
 
-/// |cosθ| (1 + 2Λ) of the width's distribution, by which it masks: GGX's is the stretched length. \[Walter et
-/// al. 2007\], the fit below Eq. 27.
+/// |cosθ| (1 + 2Λ) of the width's distribution, by which it masks: GGX's is the stretched length.
 pub fn masked_length(direction: Vec3, width: GgxWidth) -> f32 {
-    if !width.is_beckmann {
-        return ggx_stretched_length(direction, width);
+    let stretched = width.stretched(direction);
+    if width.is_beckmann {
+        beckmann_length(direction.z.abs(), stretched.truncate().length())
+    } else {
+        stretched.length()
     }
-    let cosine = direction.z.abs();
-    let a = cosine / width.stretched(direction).truncate().length().max(1e-30);
-    let masked = (1.0 - 1.259 * a + 0.396 * a * a) / (3.535 * a + 2.181 * a * a);
-    if a < 1.6 { cosine + 2.0 * cosine * masked } else { cosine }
 }
 
 /// Lower end of the spherical cap of bounded sampling, as a factor. \[Eto & Tokuyoshi 2023\] Eq. 5.

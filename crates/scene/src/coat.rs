@@ -106,6 +106,14 @@ impl LossyCoat {
     }
 }
 
+/// |cosθ| (1 + 2Λ), by which Beckmann's normals mask a direction, of the cosine and the length of its tangential
+/// part stretched by the widths. \[Walter et al. 2007\], the fit below Eq. 27.
+pub fn beckmann_length(cosine: f32, tangential: f32) -> f32 {
+    let a = cosine / tangential.max(1e-30);
+    let masked = tangential * (1.0 - 1.259 * a + 0.396 * a * a) / (3.535 + 2.181 * a);
+    if a < 1.6 { cosine + 2.0 * masked } else { cosine }
+}
+
 /// Share of light at an elevation that microfacets reflect or refract to where others do not mask it.
 fn microfacets(
     distribution: Distribution,
@@ -117,16 +125,13 @@ fn microfacets(
     const STEPS: u32 = 24;
     let to = Vec3::new((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
     let seen = |direction: Vec3| {
-        let tangent = alpha * direction.truncate().length() / direction.z.abs().max(1e-6);
-        let a = tangent.recip();
-        match distribution {
-            Distribution::Ggx => 2.0 / (1.0 + (1.0 + tangent * tangent).sqrt()),
-            // [Walter et al. 2007], the fit below Eq. 27.
-            Distribution::Beckmann if a < 1.6 => {
-                (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a)
-            }
-            Distribution::Beckmann => 1.0,
-        }
+        let cosine = direction.z.abs().max(1e-6);
+        let tangential = alpha * direction.truncate().length();
+        let length = match distribution {
+            Distribution::Ggx => cosine.hypot(tangential),
+            Distribution::Beckmann => beckmann_length(cosine, tangential),
+        };
+        2.0 * cosine / (cosine + length)
     };
     let share = |index: u32| {
         let [polar, turn] =

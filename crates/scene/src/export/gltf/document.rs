@@ -275,6 +275,5 @@ impl Sheet {
 
 /// Largest value of a texture by channel, at least 1.
 pub(super) fn peak(used: Option<&TextureUse>) -> Vec3 {
-    let values = used.map(TextureUse::values).unwrap_or_default();
-    values.iter().fold(Vec3::ONE, |peak, value| peak.max(Vec3::from_slice(&value[..3])))
+    used.map_or(Vec3::ONE, |used| used.largest().max(Vec3::ONE))
 }

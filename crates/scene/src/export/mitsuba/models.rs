@@ -239,9 +239,7 @@ impl Translator<'_> {
                     "Mitsuba multiplies no texture by the colours of vertices; they are left out",
                 );
             }
-            let is_bright =
-                |value: &[f32; 4]| (Vec3::from_slice(value) * factor).max_element() > 1.0;
-            if used.values().iter().any(is_bright) {
+            if (used.largest() * factor).max_element() > 1.0 {
                 self.subject
                     .warn("its image is above 1 in places, where Mitsuba does not cut it off");
             }
