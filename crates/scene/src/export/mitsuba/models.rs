@@ -239,7 +239,9 @@ impl Translator<'_> {
                     "Mitsuba multiplies no texture by the colours of vertices; they are left out",
                 );
             }
-            if (used.largest() * factor).max_element() > 1.0 {
+            let is_bright =
+                |value: &[f32; 4]| (Vec3::from_slice(value) * factor).max_element() > 1.0;
+            if used.values().iter().any(is_bright) {
                 self.subject
                     .warn("its image is above 1 in places, where Mitsuba does not cut it off");
             }
