@@ -80,7 +80,12 @@ void read_textures(uint path) {
             if (has_direction) {
                 axis = anisotropy.z * turned_by(axis, 2.0 * anisotropy.xy - 1.0);
             }
-            width = stretched_width(width.alpha, axis, tangent, front, shading_normal);
+            vec2 direction = along_surface(axis, tangent, front, shading_normal);
+            if (material.kind == MATERIAL_MEASURED) {
+                width.anisotropy = direction;
+            } else {
+                width = stretched_width(width.alpha, length(axis), direction);
+            }
         }
     }
     hit_surfaces[path] = Surface(

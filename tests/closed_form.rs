@@ -18,7 +18,7 @@ use fenestra::{
 use glam::{DVec3, Vec3};
 
 use crate::support::{
-    self,
+    self, materials,
     replicates::{film_mean, mean_and_error},
     scenes::{self, diffuse},
 };
@@ -105,6 +105,20 @@ fn stretched_highlights_lie_where_the_tangent_says() {
             assert!((found - expected).abs() < 0.02, "{name}: {found}, expected {expected}");
         }
     }
+    // The table of a brushed metal turns as the metal does.
+    let [metal, measured] = materials::brushed_and_measured();
+    let means = [(0.7, 5.0), (-0.7, -5.0)].map(|(turn, height)| {
+        scene.camera.position.y = height;
+        let [expected, found] = [&metal, &measured].map(|material| {
+            scene.materials[0] = material.clone();
+            scene.materials[0].surface.anisotropy.rotation = turn;
+            let settings = Settings { sampler: Sampler::Brdf, ..Settings::default() };
+            film_mean(&render(&scene, settings, 64)).x
+        });
+        assert!((found / expected - 1.0).abs() < 0.03, "{turn}: {found}, expected {expected}");
+        found
+    });
+    assert!(means[0] > means[1] + 0.1, "{means:?}");
 }
 
 #[test]

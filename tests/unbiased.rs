@@ -221,7 +221,7 @@ fn in_the_scenes_of_the_thesis() {
 ///
 /// `uniform`, `cosine` and `env` find the highlights of polished materials (lobes below 0.05) too seldom for
 /// eight replicates to tell their error: `brdf` is the reference there, and they are left out. The
-/// false alarms of 729 comparisons of 36 values: one in 12 runs. `FENESTRA_MATERIAL_PAIR` takes one pair,
+/// false alarms of 765 comparisons of 36 values: one in 12 runs. `FENESTRA_MATERIAL_PAIR` takes one pair,
 /// counted from 0.
 #[test]
 #[ignore = "takes a quarter of an hour: cargo test --release unbiased:: -- --ignored"]

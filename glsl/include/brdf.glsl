@@ -155,48 +155,95 @@ vec3 half_difference_angles(vec3 outgoing_local, vec3 incident_local) {
         phi_difference);
 }
 
-// Cell of the measured grid: RGB per steradian from three halves.
-vec3 measured_cell(uint grid, uint row, uint phi_index) {
-    uint index = grid / 2u + row * MEASURED_PHI_DIFFERENCE_BINS + phi_index;
-    return texelFetch(brdf_cells, int(index)).xyz;
+// The two bins of an axis between whose centres a position lies, and its share of the way.
+struct Between {
+    uvec2 bins;
+    float fraction;
+};
+
+// Bins around a position, in bins; the ends are held.
+Between held_bins(float position, uint count) {
+    position = clamp(position - 0.5, 0.0, float(count - 1u));
+    uint lower = uint(position);
+    return Between(uvec2(lower, min(lower + 1u, count - 1u)), position - float(lower));
+}
+
+// Bins around a position, in bins, of an axis that closes.
+Between closed_bins(float position, uint count) {
+    position -= 0.5;
+    if (position < 0.0) {
+        position += float(count);
+    }
+    uint lower = min(uint(position), count - 1u);
+    return Between(
+        uvec2(lower, lower + 1u == count ? 0u : lower + 1u), position - float(lower));
+}
+
+// One of the two bins, with its weight in `weight`.
+uint side(Between between, bool upper, inout float weight) {
+    weight *= upper ? between.fraction : 1.0 - between.fraction;
+    return upper ? between.bins.y : between.bins.x;
+}
+
+// Bins of θ_h in the grid and in its turns.
+Between theta_half_bins(float theta_half) {
+    return held_bins(
+        float(MEASURED_THETA_HALF_BINS) * sqrt(theta_half * (2.0 / PI)), MEASURED_THETA_HALF_BINS);
+}
+
+// Mixes two cells of a row that starts at a word: RGB from three halves.
+vec3 measured_cells(uint row, Between phi) {
+    uvec2 cells = row / 2u + phi.bins;
+    return mix(
+        texelFetch(brdf_cells, int(cells.x)).xyz, texelFetch(brdf_cells, int(cells.y)).xyz,
+        phi.fraction);
 }
 
 // Measured BRDF, trilinear between the centres of the grid's bins; periodic in φ_d.
 vec3 measured_value(uint table_offset, vec3 angles) {
-    float theta_half = clamp(
-        float(MEASURED_THETA_HALF_BINS) * sqrt(angles.x * (2.0 / PI)) - 0.5,
-        0.0, float(MEASURED_THETA_HALF_BINS - 1u));
-    float theta_difference = clamp(
-        float(MEASURED_THETA_DIFFERENCE_BINS) * angles.y * (2.0 / PI) - 0.5,
-        0.0, float(MEASURED_THETA_DIFFERENCE_BINS - 1u));
-    float phi = float(MEASURED_PHI_DIFFERENCE_BINS) * angles.z / PI - 0.5;
-    if (phi < 0.0) {
-        phi += float(MEASURED_PHI_DIFFERENCE_BINS);
-    }
-    uint half_0 = uint(theta_half);
-    uint half_1 = min(half_0 + 1u, MEASURED_THETA_HALF_BINS - 1u);
-    uint difference_0 = uint(theta_difference);
-    uint difference_1 = min(difference_0 + 1u, MEASURED_THETA_DIFFERENCE_BINS - 1u);
-    uint phi_0 = min(uint(phi), MEASURED_PHI_DIFFERENCE_BINS - 1u);
-    uint phi_1 = phi_0 + 1u == MEASURED_PHI_DIFFERENCE_BINS ? 0u : phi_0 + 1u;
-    float phi_fraction = phi - float(phi_0);
-
-    uint grid = table_offset + MEASURED_GRID_OFFSET;
+    Between theta_half = theta_half_bins(angles.x);
+    Between theta_difference = held_bins(
+        float(MEASURED_THETA_DIFFERENCE_BINS) * angles.y * (2.0 / PI),
+        MEASURED_THETA_DIFFERENCE_BINS);
+    Between phi = closed_bins(
+        float(MEASURED_PHI_DIFFERENCE_BINS) * angles.z / PI, MEASURED_PHI_DIFFERENCE_BINS);
     vec3 value = vec3(0.0);
     for (uint corner = 0u; corner < 4u; ++corner) {
-        bool upper_half = (corner & 1u) != 0u;
-        bool upper_difference = (corner & 2u) != 0u;
-        uint row = (upper_half ? half_1 : half_0) * MEASURED_THETA_DIFFERENCE_BINS
-            + (upper_difference ? difference_1 : difference_0);
-        float half_fraction = theta_half - float(half_0);
-        float difference_fraction = theta_difference - float(difference_0);
-        float weight = (upper_half ? half_fraction : 1.0 - half_fraction)
-            * (upper_difference ? difference_fraction : 1.0 - difference_fraction);
-        vec3 cells = mix(
-            measured_cell(grid, row, phi_0), measured_cell(grid, row, phi_1), phi_fraction);
-        value += weight * cells;
+        float weight = 1.0;
+        uint row = side(theta_half, (corner & 1u) != 0u, weight) * MEASURED_THETA_DIFFERENCE_BINS;
+        row += side(theta_difference, (corner & 2u) != 0u, weight);
+        row = table_offset + MEASURED_GRID_OFFSET + 2u * row * MEASURED_PHI_DIFFERENCE_BINS;
+        value += weight * measured_cells(row, phi);
     }
     return value;
+}
+
+// Factor of the measured BRDF, which is a mean over all turns about the normal, at the turn of a surface
+// whose unit tangent is `axis`.
+vec3 measured_turn(uint table_offset, vec3 angles, vec3 half_vector, vec2 axis) {
+    float y = axis.x * half_vector.y - axis.y * half_vector.x;
+    float x = dot(axis, half_vector.xy);
+    float azimuth = (x == 0.0 && y == 0.0) ? 0.0 : atan(y, x);
+    Between theta_half = theta_half_bins(angles.x);
+    Between theta_difference = held_bins(
+        float(MEASURED_TURN_THETA_DIFFERENCE_BINS) * angles.y * (2.0 / PI),
+        MEASURED_TURN_THETA_DIFFERENCE_BINS);
+    Between turn = closed_bins(
+        float(MEASURED_TURN_BINS) * (azimuth * (0.5 / PI) + 0.5), MEASURED_TURN_BINS);
+    Between phi = closed_bins(
+        float(MEASURED_TURN_PHI_DIFFERENCE_BINS) * angles.z / PI,
+        MEASURED_TURN_PHI_DIFFERENCE_BINS);
+    vec3 factor = vec3(0.0);
+    for (uint corner = 0u; corner < 8u; ++corner) {
+        float weight = 1.0;
+        uint row = side(theta_half, (corner & 1u) != 0u, weight);
+        row = row * MEASURED_TURN_THETA_DIFFERENCE_BINS
+            + side(theta_difference, (corner & 2u) != 0u, weight);
+        row = row * MEASURED_TURN_BINS + side(turn, (corner & 4u) != 0u, weight);
+        row = table_offset + MEASURED_TURN_OFFSET + 2u * row * MEASURED_TURN_PHI_DIFFERENCE_BINS;
+        factor += weight * measured_cells(row, phi);
+    }
+    return factor;
 }
 
 // Bin of the outgoing polar angle in the sampling table.
@@ -377,6 +424,11 @@ void brdf_evaluate_and_pdf(
     if (is_kind(material, MATERIAL_MEASURED)) {
         vec3 angles = half_difference_angles(outgoing_local, incident_local);
         value = measured_value(material.table_offset, angles);
+        if (IS_ANISOTROPIC && material.anisotropy != vec2(0.0)) {
+            value *= measured_turn(
+                material.table_offset, angles, outgoing_local + incident_local,
+                material.anisotropy);
+        }
         pdf = measured_pdf(reflector, incident_local, angles.x);
         return;
     }

@@ -281,27 +281,27 @@ vec2 turned_by(vec2 vector, vec2 direction) {
     return vec2(vector.x * turn.x - vector.y * turn.y, vector.x * turn.y + vector.y * turn.x);
 }
 
-// Widths of a surface of width `alpha` that KHR_materials_anisotropy stretches along `axis`, strength times
-// a direction in tangent and bitangent; in the frame of the shading normal. Without a tangent the axes are
-// those of that frame.
-GgxWidth stretched_width(
-    float alpha, vec2 axis, vec4 tangent, vec3 tangent_normal, vec3 shading_normal
-) {
-    float strength = min(length(axis), 1.0);
-    float along = mix(alpha, 1.0, strength * strength);
-    float mean = 0.5 * (along + alpha);
-    if (along <= alpha) {
-        return round_width(alpha);
-    }
+// Unit direction in the frame of the shading normal of `axis`, which counts in tangent and bitangent; without
+// a tangent, in the axes of that frame.
+vec2 along_surface(vec2 axis, vec4 tangent, vec3 tangent_normal, vec3 shading_normal) {
     vec2 direction = axis;
     if (tangent.w != 0.0) {
         vec3 bitangent = tangent.w * cross(tangent_normal, tangent.xyz);
         direction = to_local(
             frame_from_normal(shading_normal), axis.x * tangent.xyz + axis.y * bitangent).xy;
     }
+    return direction * inversesqrt(max(dot(direction, direction), 1.0e-30));
+}
+
+// Widths of a surface of width `alpha` that KHR_materials_anisotropy stretches by a strength along a unit
+// direction.
+GgxWidth stretched_width(float alpha, float strength, vec2 direction) {
+    strength = min(strength, 1.0);
+    float along = mix(alpha, 1.0, strength * strength);
+    if (along <= alpha) {
+        return round_width(alpha);
+    }
     // Twice the angle of the direction, since both of its ends are alike.
-    vec2 twice = turned_by(direction, direction);
-    return GgxWidth(
-        mean, (along - alpha) / (along + alpha) * twice * inversesqrt(max(dot(twice, twice), 1.0e-30)),
-        false);
+    vec2 stretch = (along - alpha) / (along + alpha) * turned_by(direction, direction);
+    return GgxWidth(0.5 * (along + alpha), stretch, false);
 }

@@ -152,6 +152,9 @@ impl MaterialTables {
                 }
                 MaterialKind::Measured { table, .. } => {
                     converted.kind = MATERIAL_MEASURED;
+                    if anisotropy.strength > 0.0 {
+                        converted.anisotropy = Vec2::from_angle(anisotropy.rotation).to_array();
+                    }
                     converted.table_offset =
                         *measured_offsets.entry(Arc::as_ptr(table)).or_insert_with(|| {
                             // Align to pairs of words, the unit in which cells are read.

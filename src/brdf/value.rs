@@ -4,13 +4,15 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::{
     brdf::{fresnel::*, ggx::*, sheen::sheen_value},
     scene::{
         coat::DIELECTRIC,
-        measured::lookup::{cosine_table, half_difference_angles, measured_value, mix},
+        measured::lookup::{
+            cosine_table, half_difference_angles, measured_turn, measured_value, mix,
+        },
     },
     shader::{constants::*, structs::Material},
 };
@@ -68,7 +70,13 @@ pub fn brdf_evaluate(
     }
     if material.kind == MATERIAL_MEASURED {
         let angles = half_difference_angles(outgoing_local, incident_local);
-        return measured_value(brdf_table, material.table_offset, angles);
+        let mut value = measured_value(brdf_table, material.table_offset, angles);
+        let axis = Vec2::from(material.anisotropy);
+        if axis != Vec2::ZERO {
+            let half_vector = outgoing_local + incident_local;
+            value *= measured_turn(brdf_table, material.table_offset, angles, half_vector, axis);
+        }
+        return value;
     }
     let half_vector = outgoing_local + incident_local;
     let cosine_difference = (0.5 * half_vector.length()).min(1.0);

@@ -346,6 +346,15 @@ constants! {
     MEASURED_DENSITY_OFFSET = MEASURED_CUMULATIVE_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
     /// Grid cells, two words each: halves red and green, half blue.
     MEASURED_GRID_OFFSET = MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
+    /// Bins of φ_h in the turns of an anisotropic table, of equal width over −π…π from the tangent.
+    MEASURED_TURN_BINS = 96;
+    /// Bins of θ_d there, of equal width; those of θ_h are the grid's.
+    MEASURED_TURN_THETA_DIFFERENCE_BINS = 8;
+    /// Bins of φ_d there, of equal width over 0…π.
+    MEASURED_TURN_PHI_DIFFERENCE_BINS = 16;
+    /// Factors of the values by θ_h, θ_d, φ_h and φ_d, as cells of the grid, if the table is anisotropic.
+    MEASURED_TURN_OFFSET = MEASURED_GRID_OFFSET
+        + 2 * MEASURED_THETA_HALF_BINS * MEASURED_THETA_DIFFERENCE_BINS * MEASURED_PHI_DIFFERENCE_BINS;
     /// Lists of living paths: that of a vertex, the one before, which it is made from, and the next, which
     /// is emptied meanwhile; a power of two.
     PATH_LISTS = 4;

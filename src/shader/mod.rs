@@ -28,7 +28,11 @@ const _: () = {
         MEASURED_COSINE_SHARE_OFFSET,
         MEASURED_CUMULATIVE_OFFSET,
         MEASURED_DENSITY_OFFSET,
-        MEASURED_GRID_OFFSET
+        MEASURED_GRID_OFFSET,
+        MEASURED_TURN_BINS,
+        MEASURED_TURN_THETA_DIFFERENCE_BINS,
+        MEASURED_TURN_PHI_DIFFERENCE_BINS,
+        MEASURED_TURN_OFFSET
     );
     let (ours, theirs) = (constants::LUMINANCE_WEIGHTS, colour::LUMINANCE_WEIGHTS);
     assert!(ours[0] == theirs[0] && ours[1] == theirs[1] && ours[2] == theirs[2]);

@@ -97,6 +97,22 @@ fn measured(diffuse: Vec3, alpha: f32) -> MaterialKind {
     }
 }
 
+/// Returns a brushed metal, stretched along its tangent, and the same from a table of all turns.
+pub fn brushed_and_measured() -> [Material; 2] {
+    static BOTH: OnceLock<[Material; 2]> = OnceLock::new();
+    let both = BOTH.get_or_init(|| {
+        let fresnel = ConductorFresnel::Schlick { reflectance: vec3(0.9, 0.7, 0.5) };
+        let metal = case("metal", 0.2, MaterialKind::Conductor { alpha: 0.2, fresnel });
+        let metal = brushed(metal, 0.6, 0.0).material;
+        let model = MaterialTables::new(std::slice::from_ref(&metal)).unwrap();
+        let value = |outgoing, incident| brdf::evaluate(&model, 0, outgoing, incident);
+        let table = Arc::new(MeasuredTable::tabulate_turns(value).unwrap());
+        let kind = MaterialKind::Measured { path: PathBuf::from("synthetic"), table };
+        [metal, brushed(case("measured brushed", 0.2, kind), 1.0, 0.0).material]
+    });
+    both.clone()
+}
+
 /// Makes a rough measured material from a plastic.
 pub fn measured_plastic() -> Material {
     case("measured", 0.3, measured(vec3(0.3, 0.2, 0.1), 0.3)).material
@@ -188,6 +204,7 @@ pub fn cases() -> &'static [Case] {
                 0.3,
                 MaterialKind::Conductor { alpha: 0.3, fresnel: grey },
             )),
+            Case { material: brushed_and_measured()[1].clone(), lobe_width: 0.2 },
         ]
     })
 }

@@ -26,7 +26,7 @@ pub(crate) struct MaterialKeys {
     /// another tangent in red and green, and a factor in blue.
     #[serde(default = "default_anisotropy")]
     pub anisotropy: Textured<f32>,
-    /// Angle from the tangent, along u, to where they are widest.
+    /// Angle from the tangent, along u, to where they are widest, or to the x axis of a measurement.
     #[serde(default)]
     pub anisotropy_rotate_deg: f32,
     /// Normals of a rough `conductor`, `plastic` or `dielectric`.

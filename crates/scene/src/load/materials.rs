@@ -66,8 +66,12 @@ impl Loader<'_> {
             }
             reader.read_surface(&entry.keys)?;
             let kind = reader.kind(&entry.kind)?;
-            let can_stretch =
-                matches!(kind, MaterialKind::Conductor { .. } | MaterialKind::Principled(_));
+            let can_stretch = matches!(
+                kind,
+                MaterialKind::Conductor { .. }
+                    | MaterialKind::Principled(_)
+                    | MaterialKind::Measured { .. }
+            );
             let message = "anisotropy is for conductor and principled materials";
             reader.check(can_stretch || reader.surface.anisotropy.strength == 0.0, message)?;
             let has_distribution = matches!(
@@ -262,6 +266,9 @@ impl Reader<'_> {
             MaterialKindEntry::Measured(entry) => {
                 let path = self.loader.file(&entry.file);
                 let table = self.measured.table(&path, self.inputs, self.warnings)?;
+                let message = "anisotropy is that of the file of a measured material";
+                self.check(self.surface.anisotropy.strength == 0.0, message)?;
+                self.surface.anisotropy.strength = f32::from(table.has_turns());
                 MaterialKind::Measured { path, table }
             }
         })

@@ -29,6 +29,15 @@ pub const MEASURED_DENSITY_OFFSET: u32 =
 /// Grid cells, two words each: halves red and green, half blue.
 pub const MEASURED_GRID_OFFSET: u32 =
     MEASURED_DENSITY_OFFSET + MEASURED_ELEVATION_BINS * MEASURED_SAMPLING_CELLS;
+/// Bins of φ_h in the turns of an anisotropic table, of equal width over −π…π from the tangent.
+pub const MEASURED_TURN_BINS: u32 = 96;
+/// Bins of θ_d there, of equal width; those of θ_h are the grid's.
+pub const MEASURED_TURN_THETA_DIFFERENCE_BINS: u32 = 8;
+/// Bins of φ_d there, of equal width over 0…π.
+pub const MEASURED_TURN_PHI_DIFFERENCE_BINS: u32 = 16;
+/// Factors of the values by θ_h, θ_d, φ_h and φ_d, as cells of the grid, if the table is anisotropic.
+pub const MEASURED_TURN_OFFSET: u32 = MEASURED_GRID_OFFSET
+    + 2 * MEASURED_THETA_HALF_BINS * MEASURED_THETA_DIFFERENCE_BINS * MEASURED_PHI_DIFFERENCE_BINS;
 /// Least value of a cell, 1/sr: where a BRDF reflects nothing at all, light found for one direction could
 /// not be shared with others (`glsl/sharing/shared_part.glsl`). A half holds it exactly.
 pub const MEASURED_LEAST_VALUE: f32 = 1.0 / (1 << 20) as f32;

@@ -62,48 +62,113 @@ pub fn half_difference_angles(outgoing_local: Vec3, incident_local: Vec3) -> Vec
     )
 }
 
-/// Cell of the measured grid: RGB per steradian from three halves.
-fn measured_cell(brdf_table: &[u32], grid: u32, row: u32, phi_index: u32) -> Vec3 {
-    let index = (grid + 2 * (row * MEASURED_PHI_DIFFERENCE_BINS + phi_index)) as usize;
+/// The two bins of an axis between whose centres a position lies, and its share of the way.
+struct Between {
+    bins: [u32; 2],
+    fraction: f32,
+}
+
+/// Bins around a position, in bins; the ends are held.
+fn held_bins(position: f32, count: u32) -> Between {
+    let position = (position - 0.5).clamp(0.0, (count - 1) as f32);
+    let lower = position as u32;
+    Between { bins: [lower, (lower + 1).min(count - 1)], fraction: position - lower as f32 }
+}
+
+/// Bins around a position, in bins, of an axis that closes.
+fn closed_bins(position: f32, count: u32) -> Between {
+    let mut position = position - 0.5;
+    if position < 0.0 {
+        position += count as f32;
+    }
+    let lower = (position as u32).min(count - 1);
+    let upper = if lower + 1 == count { 0 } else { lower + 1 };
+    Between { bins: [lower, upper], fraction: position - lower as f32 }
+}
+
+/// One of the two bins and its weight.
+fn side(between: &Between, upper: bool) -> (u32, f32) {
+    let fraction = between.fraction;
+    (between.bins[usize::from(upper)], if upper { fraction } else { 1.0 - fraction })
+}
+
+/// Bins of θ_h in the grid and in its turns.
+fn theta_half_bins(theta_half: f32) -> Between {
+    held_bins(
+        MEASURED_THETA_HALF_BINS as f32 * (theta_half * (2.0 / PI)).sqrt(),
+        MEASURED_THETA_HALF_BINS,
+    )
+}
+
+/// Mixes two cells of a row that starts at a word: RGB from three halves.
+fn measured_cells(brdf_table: &[u32], row: u32, phi: &Between) -> Vec3 {
     let half = |bits: u32| f16::from_bits(bits as u16).to_f32();
-    let (first, second) = (brdf_table[index], brdf_table[index + 1]);
-    vec3(half(first & 0xffff), half(first >> 16), half(second & 0xffff))
+    let [lower, upper] = phi.bins.map(|bin| {
+        let index = (row + 2 * bin) as usize;
+        let (first, second) = (brdf_table[index], brdf_table[index + 1]);
+        vec3(half(first & 0xffff), half(first >> 16), half(second & 0xffff))
+    });
+    lower * (1.0 - phi.fraction) + upper * phi.fraction
 }
 
 /// Measured BRDF, trilinear between the centres of the grid's bins; periodic in φ_d.
 pub fn measured_value(brdf_table: &[u32], table_offset: u32, angles: Vec3) -> Vec3 {
-    let theta_half = (MEASURED_THETA_HALF_BINS as f32 * (angles.x * (2.0 / PI)).sqrt() - 0.5)
-        .clamp(0.0, (MEASURED_THETA_HALF_BINS - 1) as f32);
-    let theta_difference = (MEASURED_THETA_DIFFERENCE_BINS as f32 * angles.y * (2.0 / PI) - 0.5)
-        .clamp(0.0, (MEASURED_THETA_DIFFERENCE_BINS - 1) as f32);
-    let mut phi = MEASURED_PHI_DIFFERENCE_BINS as f32 * angles.z / PI - 0.5;
-    if phi < 0.0 {
-        phi += MEASURED_PHI_DIFFERENCE_BINS as f32;
-    }
-    let half_0 = theta_half as u32;
-    let half_1 = (half_0 + 1).min(MEASURED_THETA_HALF_BINS - 1);
-    let difference_0 = theta_difference as u32;
-    let difference_1 = (difference_0 + 1).min(MEASURED_THETA_DIFFERENCE_BINS - 1);
-    let phi_0 = (phi as u32).min(MEASURED_PHI_DIFFERENCE_BINS - 1);
-    let phi_1 = if phi_0 + 1 == MEASURED_PHI_DIFFERENCE_BINS { 0 } else { phi_0 + 1 };
-    let phi_fraction = phi - phi_0 as f32;
-
-    let grid = table_offset + MEASURED_GRID_OFFSET;
+    let theta_half = theta_half_bins(angles.x);
+    let theta_difference = held_bins(
+        MEASURED_THETA_DIFFERENCE_BINS as f32 * angles.y * (2.0 / PI),
+        MEASURED_THETA_DIFFERENCE_BINS,
+    );
+    let phi = closed_bins(
+        MEASURED_PHI_DIFFERENCE_BINS as f32 * angles.z / PI,
+        MEASURED_PHI_DIFFERENCE_BINS,
+    );
     let mut value = Vec3::ZERO;
     for corner in 0..4 {
-        let upper_half = corner & 1 != 0;
-        let upper_difference = corner & 2 != 0;
-        let row = (if upper_half { half_1 } else { half_0 }) * MEASURED_THETA_DIFFERENCE_BINS
-            + (if upper_difference { difference_1 } else { difference_0 });
-        let half_fraction = theta_half - half_0 as f32;
-        let difference_fraction = theta_difference - difference_0 as f32;
-        let weight = (if upper_half { half_fraction } else { 1.0 - half_fraction })
-            * (if upper_difference { difference_fraction } else { 1.0 - difference_fraction });
-        let cells = measured_cell(brdf_table, grid, row, phi_0) * (1.0 - phi_fraction)
-            + measured_cell(brdf_table, grid, row, phi_1) * phi_fraction;
-        value += weight * cells;
+        let (half, half_weight) = side(&theta_half, corner & 1 != 0);
+        let (difference, difference_weight) = side(&theta_difference, corner & 2 != 0);
+        let row = half * MEASURED_THETA_DIFFERENCE_BINS + difference;
+        let row = table_offset + MEASURED_GRID_OFFSET + 2 * row * MEASURED_PHI_DIFFERENCE_BINS;
+        value += half_weight * difference_weight * measured_cells(brdf_table, row, &phi);
     }
     value
+}
+
+/// Factor of the measured BRDF, which is a mean over all turns about the normal, at the turn of a surface
+/// whose unit tangent is `axis`.
+pub fn measured_turn(
+    brdf_table: &[u32],
+    table_offset: u32,
+    angles: Vec3,
+    half_vector: Vec3,
+    axis: Vec2,
+) -> Vec3 {
+    let y = axis.x * half_vector.y - axis.y * half_vector.x;
+    let x = axis.dot(half_vector.truncate());
+    let azimuth = if x == 0.0 && y == 0.0 { 0.0 } else { y.atan2(x) };
+    let theta_half = theta_half_bins(angles.x);
+    let theta_difference = held_bins(
+        MEASURED_TURN_THETA_DIFFERENCE_BINS as f32 * angles.y * (2.0 / PI),
+        MEASURED_TURN_THETA_DIFFERENCE_BINS,
+    );
+    let turn =
+        closed_bins(MEASURED_TURN_BINS as f32 * (azimuth * (0.5 / PI) + 0.5), MEASURED_TURN_BINS);
+    let phi = closed_bins(
+        MEASURED_TURN_PHI_DIFFERENCE_BINS as f32 * angles.z / PI,
+        MEASURED_TURN_PHI_DIFFERENCE_BINS,
+    );
+    let mut factor = Vec3::ZERO;
+    for corner in 0..8 {
+        let (half, half_weight) = side(&theta_half, corner & 1 != 0);
+        let (difference, difference_weight) = side(&theta_difference, corner & 2 != 0);
+        let (turn, turn_weight) = side(&turn, corner & 4 != 0);
+        let row = (half * MEASURED_TURN_THETA_DIFFERENCE_BINS + difference) * MEASURED_TURN_BINS;
+        let row = 2 * (row + turn) * MEASURED_TURN_PHI_DIFFERENCE_BINS;
+        factor += half_weight
+            * difference_weight
+            * turn_weight
+            * measured_cells(brdf_table, table_offset + MEASURED_TURN_OFFSET + row, &phi);
+    }
+    factor
 }
 
 /// Bin of the outgoing polar angle in the sampling table.

@@ -23,10 +23,6 @@ use crate::{
     spectrum,
 };
 
-/// Turns over which an anisotropic BRDF is averaged. An odd count visits twice as many where half a turn
-/// changes nothing.
-const TURNS: u32 = 17;
-
 /// Measured BRDF as its file interpolates it.
 pub struct AdaptiveBrdf {
     theta: Vec<f32>,
@@ -45,6 +41,8 @@ pub struct AdaptiveBrdf {
     is_relative: bool,
     /// Signs of x and y that carry directions into the measured part of a symmetric BRDF.
     symmetries: &'static [[f64; 2]],
+    /// True if the BRDF depends on the turn of the surface about its normal.
+    is_anisotropic: bool,
     /// Parts that the table has no place for.
     pub traits: RglTraits,
     clipped_count: usize,
@@ -53,8 +51,13 @@ pub struct AdaptiveBrdf {
 /// Reads a file and bakes [`AdaptiveBrdf::value`] on the half/difference grid.
 pub fn load(path: &Path) -> Result<MeasuredTable> {
     let brdf = AdaptiveBrdf::read(path)?;
-    let mut table = MeasuredTable::tabulate(|outgoing, incident| brdf.value(outgoing, incident))
-        .map_err(|message| Error::format(path, message))?;
+    let value = |outgoing, incident| brdf.value(outgoing, incident);
+    let table = if brdf.is_anisotropic {
+        MeasuredTable::tabulate_turns(value)
+    } else {
+        MeasuredTable::tabulate(value)
+    };
+    let mut table = table.map_err(|message| Error::format(path, message))?;
     table.warnings.extend(brdf.warnings());
     table.rgl = Some(brdf.traits);
     Ok(table)
@@ -144,7 +147,8 @@ impl AdaptiveBrdf {
             color_size: [color_columns, color_rows],
             is_relative: file.flag("jacobian")?,
             symmetries,
-            traits: RglTraits { is_anisotropic, is_spectral },
+            is_anisotropic,
+            traits: RglTraits { is_spectral },
             clipped_count,
         })
     }
@@ -152,11 +156,6 @@ impl AdaptiveBrdf {
     /// Parts that [`Self::value`] leaves out, for the log.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        if self.traits.is_anisotropic {
-            let mean = "anisotropic: rendered as its mean over all turns about the normal, which looks \
-                        alike from all sides";
-            warnings.push(mean.to_owned());
-        }
         if self.clipped_count > 0 {
             warnings.push(format!(
                 "{} of {} colours are beyond Rec.709 or negative; their negative channels were set to 0",
@@ -167,21 +166,13 @@ impl AdaptiveBrdf {
         warnings
     }
 
-    /// Value in 1/sr, without the cosine, for the table: the mean over all turns, and reciprocal. The two
-    /// values of a pair of directions enter with the cosine that divides them as a weight, so that
-    /// neither is large where its cosine is small.
+    /// Value in 1/sr, without the cosine, for the table: reciprocal. The two values of a pair of directions
+    /// enter with the cosine that divides them as a weight, so that neither is large where its cosine is
+    /// small.
     pub fn value(&self, outgoing: Vec3, incident: Vec3) -> Vec3 {
-        let turns = if self.traits.is_anisotropic { TURNS } else { 1 };
-        let both = |turn: u32| {
-            let angle = TAU * f64::from(turn) / f64::from(turns);
-            let [outgoing, incident] = [outgoing, incident].map(|direction| {
-                let direction = direction.as_dvec3();
-                direction.truncate().rotate(DVec2::from_angle(angle)).extend(direction.z)
-            });
-            self.reflected(outgoing, incident) + self.reflected(incident, outgoing)
-        };
-        let sum: DVec3 = (0..turns).map(both).sum();
-        (sum / f64::from(turns) / f64::from(outgoing.z + incident.z)).as_vec3()
+        let [out, into] = [outgoing, incident].map(Vec3::as_dvec3);
+        let both = self.reflected(out, into) + self.reflected(into, out);
+        (both / (out.z + into.z)).as_vec3()
     }
 
     /// Light reflected toward `outgoing` of a unit of radiance per steradian from `incident`, f·cosθ, 1/sr:
@@ -205,7 +196,7 @@ impl AdaptiveBrdf {
         let angles = |d: DVec3| (d.truncate().length().atan2(d.z), d.y.atan2(d.x));
         let (theta_i, phi_i) = (angles(outgoing).0, middle + off_middle);
         let (theta_m, phi_m) = angles(outgoing + incident);
-        let turn = if self.traits.is_anisotropic { 0.0 } else { phi_i };
+        let turn = if self.is_anisotropic { 0.0 } else { phi_i };
         let square =
             |theta: f64, phi: f64| [(theta / FRAC_PI_2).sqrt(), ((phi + PI) / TAU).rem_euclid(1.0)];
         let normal = square(theta_m, phi_m - turn);

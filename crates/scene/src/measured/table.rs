@@ -2,15 +2,15 @@
 //! `measured_value`, `measured_pdf` and `measured_sample` of `brdf.glsl` read.
 //!
 //! Layout of the words: directional albedo, cosine shares, cumulative probabilities and densities
-//! of the sampling table, grid cells of two words; offsets are `MEASURED_…_OFFSET` of
-//! [`layout`](super::layout).
+//! of the sampling table, grid cells of two words, as many words of each factor by turn; offsets are
+//! `MEASURED_…_OFFSET` of [`layout`](super::layout).
 
 use std::{
     f32::consts::{FRAC_PI_2, PI},
     fmt,
 };
 
-use glam::{Vec3, vec3};
+use glam::{Quat, Vec3, vec3};
 use half::f16;
 use rayon::prelude::*;
 
@@ -24,19 +24,27 @@ use crate::measured::{
 const THETA_HALF: usize = MEASURED_THETA_HALF_BINS as usize;
 pub(super) const THETA_DIFFERENCE: usize = MEASURED_THETA_DIFFERENCE_BINS as usize;
 pub(super) const PHI_DIFFERENCE: usize = MEASURED_PHI_DIFFERENCE_BINS as usize;
+/// Turns about the normal over which an anisotropic BRDF is averaged. An odd count visits twice as many where
+/// half a turn changes nothing.
+const MEAN_TURNS: u32 = 17;
+/// Bins of φ_h, θ_d and φ_d of its factors.
+const TURN_COUNTS: [usize; 3] = [
+    MEASURED_TURN_BINS as usize,
+    MEASURED_TURN_THETA_DIFFERENCE_BINS as usize,
+    MEASURED_TURN_PHI_DIFFERENCE_BINS as usize,
+];
 /// Cells of the grid.
 pub const CELL_COUNT: usize = THETA_HALF * THETA_DIFFERENCE * PHI_DIFFERENCE;
 
 /// Parts of an RGL file that the table has no place for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RglTraits {
-    /// The BRDF depends on the turn of the surface about its normal; the table holds the mean.
-    pub is_anisotropic: bool,
     /// The file has spectra; the table holds their linear sRGB under D65.
     pub is_spectral: bool,
 }
 
-/// Isotropic measured BRDF on a grid of θ_h × θ_d × φ_d, with its sampling table.
+/// Measured BRDF on a grid of θ_h × θ_d × φ_d, with its sampling table: of an anisotropic one the mean over
+/// all turns about the normal, and its factors by turn.
 #[derive(Clone, PartialEq)]
 pub struct MeasuredTable {
     words: Vec<u32>,
@@ -64,10 +72,15 @@ impl fmt::Debug for MeasuredTable {
 /// the plane y = 0. The centre in θ_h follows the square-root spacing, so that interpolation there
 /// returns the cell's value unmixed.
 pub fn bin_directions(theta_half: usize, theta_difference: usize, phi: usize) -> (Vec3, Vec3) {
+    centre_directions(theta_half, [theta_difference, phi], [THETA_DIFFERENCE, PHI_DIFFERENCE])
+}
+
+/// As [`bin_directions`], for other counts of bins of θ_d and φ_d.
+fn centre_directions(theta_half: usize, bins: [usize; 2], counts: [usize; 2]) -> (Vec3, Vec3) {
     let root = (theta_half as f32 + 0.5) / THETA_HALF as f32;
     let theta_half = root * root * FRAC_PI_2;
-    let theta_difference = (theta_difference as f32 + 0.5) / THETA_DIFFERENCE as f32 * FRAC_PI_2;
-    let phi = (phi as f32 + 0.5) / PHI_DIFFERENCE as f32 * PI;
+    let centre = |axis: usize| (bins[axis] as f32 + 0.5) / counts[axis] as f32;
+    let (theta_difference, phi) = (centre(0) * FRAC_PI_2, centre(1) * PI);
     let (sine_half, cosine_half) = theta_half.sin_cos();
     let (sine, cosine) = theta_difference.sin_cos();
     let incident = vec3(sine * phi.cos(), sine * phi.sin(), cosine);
@@ -111,6 +124,56 @@ impl MeasuredTable {
         Self::from_cells(corrected.collect())
     }
 
+    /// As [`Self::tabulate`], for a function that depends on the turn about the normal, with the tangent
+    /// along x. The factors of a bin have the mean 1 over all turns.
+    pub fn tabulate_turns(value: impl Fn(Vec3, Vec3) -> Vec3 + Sync) -> Result<Self, String> {
+        let turned = |angle: f32, outgoing: Vec3, incident: Vec3| {
+            let turn = Quat::from_rotation_z(angle);
+            value(turn * outgoing, turn * incident)
+        };
+        let mut table = Self::tabulate(|outgoing, incident| {
+            let angles = (0..MEAN_TURNS).map(|turn| 2.0 * PI * turn as f32 / MEAN_TURNS as f32);
+            let sum: Vec3 = angles.map(|angle| turned(angle, outgoing, incident)).sum();
+            sum / MEAN_TURNS as f32
+        })?;
+        let [turns, differences, phis] = TURN_COUNTS;
+        let slice = turns * phis;
+        let mut factors = vec![Vec3::NAN; THETA_HALF * differences * slice];
+        factors.par_chunks_mut(slice).enumerate().for_each(|(row, factors)| {
+            for phi in 0..phis {
+                let bins = [row % differences, phi];
+                let (outgoing, incident) =
+                    centre_directions(row / differences, bins, [differences, phis]);
+                if outgoing.z <= 0.0 || incident.z <= 0.0 {
+                    continue;
+                }
+                let values: Vec<Vec3> = (0..turns)
+                    .map(|turn| 2.0 * PI * (turn as f32 + 0.5) / turns as f32 - PI)
+                    .map(|angle| turned(angle, outgoing, incident))
+                    .collect();
+                let mean = values.iter().sum::<Vec3>() / turns as f32;
+                for (turn, value) in values.iter().enumerate() {
+                    factors[turn * phis + phi] = value / mean;
+                }
+            }
+        });
+        // Where a direction is below the surface, as at the last θ_d or else θ_h before.
+        for first in (0..THETA_HALF).flat_map(|half| (0..slice).map(move |at| (half, at))) {
+            fill_line(&mut factors, first.0 * differences * slice + first.1, slice, differences);
+        }
+        for first in 0..differences * slice {
+            fill_line(&mut factors, first, differences * slice, THETA_HALF);
+        }
+        table.words.resize(MEASURED_TURN_OFFSET as usize + 2 * factors.len(), 0);
+        pack(&factors, &mut table.words[MEASURED_TURN_OFFSET as usize..]);
+        Ok(table)
+    }
+
+    /// True if the table is anisotropic: materials of it are turned as the tangents of meshes.
+    pub fn has_turns(&self) -> bool {
+        self.words.len() > MEASURED_TURN_OFFSET as usize
+    }
+
     /// Builds the table from `CELL_COUNT` cells in 1/sr in the order of [`cell_index`]. A cell with
     /// a negative or non-finite component is invalid and takes the value of the nearest valid one,
     /// so that interpolation needs no special case. Fails if no cell is valid.
@@ -135,15 +198,16 @@ impl MeasuredTable {
         if clamped > 0 {
             warnings.push(format!("{clamped} cells above {largest}/sr were clamped to that"));
         }
-        let mut words = vec![0; MEASURED_GRID_OFFSET as usize + 2 * CELL_COUNT];
-        pack(&cells, &mut words);
+        let grid = MEASURED_GRID_OFFSET as usize;
+        let mut words = vec![0; grid + 2 * CELL_COUNT];
+        pack(&cells, &mut words[grid..]);
         if let Some(limit) = EnergyLimit::new(&words) {
             // Cells below the surface, read only as neighbours, take the factor of the horizon.
             for_each_cell(&mut cells, |cell, outgoing, incident| {
                 *cell *= limit.factor(outgoing) * limit.factor(incident);
             });
             average_poles(&mut cells);
-            pack(&cells, &mut words);
+            pack(&cells, &mut words[grid..]);
             warnings.push(format!(
                 "reflected up to {:.2} times the light it receives and was scaled down to 1",
                 limit.largest_albedo
@@ -187,7 +251,8 @@ impl MeasuredTable {
         )
     }
 
-    /// Value in 1/sr, without the cosine; 0 unless both directions are above the surface.
+    /// Value in 1/sr, without the cosine, the mean over all turns about the normal; 0 unless both directions
+    /// are above the surface.
     pub fn evaluate(&self, outgoing_local: Vec3, incident_local: Vec3) -> Vec3 {
         if outgoing_local.z <= 0.0 || incident_local.z <= 0.0 {
             return Vec3::ZERO;
@@ -245,10 +310,9 @@ fn fill_line(cells: &mut [Vec3], first: usize, stride: usize, count: usize) {
     }
 }
 
-/// Packs the cells as halves into the grid's words.
+/// Packs the cells as halves into words of a grid.
 fn pack(cells: &[Vec3], words: &mut [u32]) {
-    let grid = &mut words[MEASURED_GRID_OFFSET as usize..];
-    grid.par_chunks_exact_mut(2).zip(cells).for_each(|(words, cell)| {
+    words.par_chunks_exact_mut(2).zip(cells).for_each(|(words, cell)| {
         let half = |value: f32| {
             u32::from(f16::from_f32(value.clamp(MEASURED_LEAST_VALUE, f16::MAX.to_f32())).to_bits())
         };

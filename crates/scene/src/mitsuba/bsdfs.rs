@@ -163,7 +163,10 @@ impl Reader {
         let name = parameters.required("filename", parameters.string("filename")?)?;
         let path = parameters.node.file(name)?;
         let table = self.measured.table(&path, &mut self.inputs, &mut self.warnings)?;
-        Ok(one_sided(MaterialKind::Measured { path, table }))
+        let strength = f32::from(table.has_turns());
+        let mut model = one_sided(MaterialKind::Measured { path, table });
+        model.surface.anisotropy.strength = strength;
+        Ok(model)
     }
 
     fn two_sided(&mut self, parameters: &Parameters<'_>) -> Result<Material> {

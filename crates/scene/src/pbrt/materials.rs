@@ -130,7 +130,7 @@ impl<'a> Materials<'a> {
             }
             "mix" => return self.mix(entity, name),
             "interface" | "none" | "" => return Ok(None),
-            "measured" => self.measured(entity)?,
+            "measured" => self.measured(entity, &mut surface)?,
             other => {
                 return Err(entity.error(format!(
                     "unknown material `{other}`; files of pbrt-v3 are converted by `pbrt --upgrade`"
@@ -152,11 +152,12 @@ impl<'a> Materials<'a> {
         Ok(Some(Material { name, kind, surface }))
     }
 
-    fn measured(&mut self, entity: &Entity) -> Result<MaterialKind> {
+    fn measured(&mut self, entity: &Entity, surface: &mut Surface) -> Result<MaterialKind> {
         let name = entity.required("filename")?;
         let log = &mut self.textures.log;
         let path = log.folder.file(name).map_err(|message| entity.error(message))?;
         let table = self.measured.table(&path, &mut log.inputs, &mut log.warnings)?;
+        surface.anisotropy.strength = f32::from(table.has_turns());
         Ok(MaterialKind::Measured { path, table })
     }
 

@@ -174,7 +174,8 @@ impl<'a> Translator<'a> {
 
     fn anisotropy(&mut self) {
         let Anisotropy { strength, rotation, direction } = &self.subject.surface.anisotropy;
-        if *strength > 0.0 {
+        let is_measured = matches!(self.subject.material.kind, MaterialKind::Measured { .. });
+        if *strength > 0.0 && !is_measured {
             let mut model = json!({"anisotropyStrength": strength, "anisotropyRotation": rotation});
             if let Some(info) =
                 self.texture(Layout::Vector, [direction.as_ref(), None], [Vec3::ONE; 2])

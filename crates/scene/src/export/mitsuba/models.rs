@@ -186,11 +186,9 @@ impl Translator<'_> {
     /// Copy of an RGL file, which Mitsuba reads.
     fn measured(&mut self, path: &Path, traits: RglTraits) -> String {
         let file = path.display();
-        if traits.is_anisotropic {
-            self.subject.warn(&format!(
-                "{file} is anisotropic in Mitsuba, along the tangents of the mesh; Fenestra renders its \
-                 mean over all turns"
-            ));
+        if self.subject.surface.anisotropy.rotation != 0.0 {
+            self.subject
+                .warn("its tangents are turned, which Mitsuba's measured material leaves out");
         }
         if traits.is_spectral {
             self.subject.warn(&format!(
