@@ -14,6 +14,7 @@ mod instances_in_files;
 mod math;
 mod mesh_materials;
 mod mitsuba;
+mod mitsuba_by_hand;
 mod pbrt;
 mod rgl;
 mod scene;

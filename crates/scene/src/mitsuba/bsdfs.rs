@@ -89,7 +89,7 @@ impl Reader {
                 model.surface.opacity.factor = 0.0;
                 model
             }
-            "diffuse" | "lambertian" => {
+            "diffuse" | "lambertian" | "roughdiffuse" => {
                 let is_older = parameters.any("reflectance")?.is_none();
                 let name = if is_older { "diffuse_reflectance" } else { "reflectance" };
                 let value = self.value_or(&parameters, name, Role::Reflectance, 0.5)?;
@@ -359,7 +359,8 @@ impl Reader {
             None => 1.0,
         };
         let metal = match (material, eta, k) {
-            (None, Some(eta), Some(k)) => Some((eta, k)),
+            (None, Some(eta), k) => Some((eta, k.unwrap_or(Vec3::ONE))),
+            (None, None, Some(k)) => Some((Vec3::ZERO, k)),
             (None | Some("none"), None, None) => None,
             (Some(name), None, None) => Some(
                 media::conductor(name).map(|(eta, k)| (eta.as_vec3(), k.as_vec3())).ok_or_else(
@@ -371,7 +372,7 @@ impl Reader {
                     },
                 )?,
             ),
-            _ => return Err(node.error("expected either `material` or both `eta` and `k`")),
+            _ => return Err(node.error("expected either `material` or `eta` and `k`")),
         };
         let value = self.value_or(parameters, "specular_reflectance", Role::Reflectance, 1.0)?;
         let width = alpha.unwrap_or(MIN_ALPHA);

@@ -218,7 +218,7 @@ impl Builder {
             let message = format!("expected at most {MAX_FILE_BYTES} bytes of XML, found {bytes}");
             return Err(Error::format(path, message));
         }
-        let xml_text = files::read_text(path)?;
+        let xml_text = strict(&files::decoded(&files::read(path)?));
         let file = self.document.files.len();
         self.document.files.push(path.to_path_buf());
         self.open.push(path.to_path_buf());
@@ -245,9 +245,7 @@ impl Builder {
             self.document.version = first.parse().unwrap_or(self.document.version);
         }
         let source = Source { path, file, lines: &lines };
-        for child in root.children().filter(roxmltree::Node::is_element) {
-            self.element(&source, child, parent, depth + 1)?;
-        }
+        self.children(&source, root, parent, depth)?;
         self.open.pop();
         Ok(())
     }
@@ -271,8 +269,12 @@ impl Builder {
         let mut attributes = Vec::new();
         for attribute in node.attributes() {
             let value = self.replace(attribute.value()).map_err(error)?;
-            let is_name = attribute.name() == "name" && tag != "default";
-            let value = if is_name { snake_case(&value) } else { value };
+            let value = match attribute.name() {
+                "name" if tag != "default" => snake_case(&value),
+                // Plugins are files, whose case some systems do not tell apart.
+                "type" => value.to_ascii_lowercase(),
+                _ => value,
+            };
             attributes.push((attribute.name().to_owned(), value));
         }
         let attribute = |name: &str| {
@@ -301,12 +303,18 @@ impl Builder {
                 return Ok(());
             }
             "include" => return self.include(&attribute("filename")?, parent, depth, &error),
+            // Shapes of one mesh look as they do one by one.
+            "shape" if attribute("type").is_ok_and(|kind| kind == "merge") => {
+                return self.children(source, node, parent, depth);
+            }
             _ => {}
         }
         let index = self.document.elements.len();
         let id = if tag == "ref" { None } else { attribute("id").ok() };
+        let is_texture =
+            tag == "spectrum" && attribute("type").is_ok_and(|kind| !is_spectrum(&kind));
         let element = Element {
-            tag: tag.to_owned(),
+            tag: if is_texture { "texture" } else { tag }.to_owned(),
             attributes,
             children: Vec::new(),
             file: source.file,
@@ -320,10 +328,18 @@ impl Builder {
             let place = Node { document: &self.document, index: first }.place();
             return Err(error(format!("the id `{id}` is taken by the element of {place}")));
         }
-        for child in node.children().filter(roxmltree::Node::is_element) {
-            self.element(source, child, index, depth + 1)?;
-        }
-        Ok(())
+        self.children(source, node, index, depth)
+    }
+
+    fn children(
+        &mut self,
+        source: &Source,
+        node: roxmltree::Node,
+        parent: usize,
+        depth: usize,
+    ) -> Result<()> {
+        let mut children = node.children().filter(roxmltree::Node::is_element);
+        children.try_for_each(|child| self.element(source, child, parent, depth + 1))
     }
 
     fn include(
@@ -371,6 +387,32 @@ impl Builder {
     }
 }
 
+/// Text as a strict reader takes it, with its lines where they are: Mitsuba's reader takes comments of
+/// dashes, `&` in names, and space above the declaration, which files written by hand have.
+fn strict(text: &str) -> String {
+    let mut strict = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find(['<', '&']) {
+        strict.push_str(&rest[..at]);
+        rest = &rest[at..];
+        let skipped = [("<!--", "-->"), ("<?", "?>")].into_iter().find_map(|(start, end)| {
+            let inside = rest.strip_prefix(start)?;
+            Some(inside.find(end).map_or(rest.len(), |at| start.len() + at + end.len()))
+        });
+        if let Some(length) = skipped {
+            let space = |c| if c == '\n' { c } else { ' ' };
+            strict.extend(rest[..length].chars().map(space));
+            rest = &rest[length..];
+        } else {
+            let names = ["&amp;", "&lt;", "&gt;", "&quot;", "&apos;", "&#"];
+            let is_bare = rest.starts_with('&') && !names.iter().any(|name| rest.starts_with(name));
+            strict.push_str(if is_bare { "&amp;" } else { &rest[..1] });
+            rest = &rest[1..];
+        }
+    }
+    strict + rest
+}
+
 /// File being read.
 struct Source<'a> {
     path: &'a Path,
@@ -390,6 +432,12 @@ impl Lines {
     pub(super) fn line(&self, byte: usize) -> u32 {
         self.0.partition_point(|start| *start <= byte) as u32 + 1
     }
+}
+
+/// Tells spectra from textures by their type; both may be the element `spectrum`.
+pub(super) fn is_spectrum(kind: &str) -> bool {
+    let kinds = ["", "blackbody", "uniform", "d65", "srgb", "rgb", "regular", "irregular"];
+    kinds.contains(&kind)
 }
 
 /// Name of version 3 for one of version 0.6: `toWorld` is `to_world`, `intIOR` `int_ior`.

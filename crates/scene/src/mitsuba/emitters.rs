@@ -35,7 +35,10 @@ impl Reader {
                 let map = EnvironmentMap::constant(light(&parameters, "radiance")?, 1.0);
                 Some(map.map_err(|message| node.error(message))?)
             }
-            "envmap" => Some(self.environment_map(&parameters)?),
+            "envmap" => match self.environment_map(&parameters)? {
+                None => return Ok(()),
+                map => map,
+            },
             "sunsky" | "sky" | "sun" => Some(self.daylight(&parameters)?),
             _ => None,
         };
@@ -65,18 +68,22 @@ impl Reader {
         Ok(())
     }
 
-    fn environment_map(&mut self, parameters: &Parameters<'_>) -> Result<EnvironmentMap> {
+    /// Map of an emitter; none of a file that is not there.
+    fn environment_map(&mut self, parameters: &Parameters<'_>) -> Result<Option<EnvironmentMap>> {
         let node = parameters.node;
         let name = parameters.required("filename", parameters.string("filename")?)?;
-        let path = node.file(name)?;
+        let Some(path) = node.file_if_there(name)? else {
+            let name = format!("emitter `envmap` of `{name}`, which is not there");
+            self.ignored.add_named(features::MI_EMITTER, &name, || node.place());
+            return Ok(None);
+        };
         let scale = parameters.float_in("scale", (0.0, f32::MAX))?.unwrap_or(1.0);
         let matrix = parameters.transform("to_world")?;
         parameters.without_effect("mis_compensation cache gamma");
         let map = load_map(&path, scale, matrix, &mut self.warnings)?;
         self.inputs.push(path);
-        map.ok_or_else(|| {
-            node.error("to_world: expected a rotation, found a matrix without inverse")
-        })
+        let message = "to_world: expected a rotation, found a matrix without inverse";
+        map.map(Some).ok_or_else(|| node.error(message))
     }
 
     fn spot(&mut self, parameters: &Parameters<'_>) -> Result<LampKind> {

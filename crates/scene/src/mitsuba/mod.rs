@@ -89,8 +89,9 @@ pub(crate) fn read(path: &Path, camera: Option<&str>, folder: Folder) -> Result<
             "emitter" | "luminaire" => reader.emitter(node)?,
             "integrator" => reader.integrator(node)?,
             "sampler" => reader.sampler(node)?,
-            // Models, textures and media are read where a shape uses them.
-            "bsdf" | "texture" | "spectrum" | "rgb" | "medium" => {}
+            // Others are read where a shape or a sensor uses them.
+            "bsdf" | "texture" | "spectrum" | "rgb" | "medium" | "film" | "rfilter" | "volume"
+            | "phase" => {}
             found => {
                 let name = format!("`{found}` in `scene`");
                 reader.ignored.add_named(features::MI_ELEMENT, &name, || node.place());

@@ -65,9 +65,9 @@ impl<'a> Parameters<'a> {
 
     pub(super) fn boolean(&self, name: &str) -> Result<Option<bool>> {
         let Some(node) = self.typed(name, &["boolean"])? else { return Ok(None) };
-        match value(node)?.trim() {
-            "true" | "True" | "1" => Ok(Some(true)),
-            "false" | "False" | "0" => Ok(Some(false)),
+        match value(node)?.trim().to_ascii_lowercase().as_str() {
+            "true" | "1" => Ok(Some(true)),
+            "false" | "0" => Ok(Some(false)),
             found => Err(node.error(format!("`{name}`: expected true or false, found `{found}`"))),
         }
     }
@@ -83,7 +83,7 @@ impl<'a> Parameters<'a> {
 
     /// Transform; the identity if it is not there.
     pub(super) fn transform(&self, name: &str) -> Result<DMat4> {
-        let node = self.typed(name, &["transform"])?;
+        let node = self.typed(name, &["transform", "animation"])?;
         node.map_or(Ok(DMat4::IDENTITY), transform)
     }
 
@@ -125,13 +125,18 @@ impl<'a> Parameters<'a> {
     /// Names every parameter that has not been used.
     pub(super) fn finish(&self, ignored: &mut Ignored) {
         let used = self.used.borrow();
-        for child in self.node.children().filter(|child| !used.contains(&child.index)) {
+        let is_left = |child: &Node<'_>| child.tag() == "animation" || !used.contains(&child.index);
+        for child in self.node.children().filter(is_left) {
             let owner = match self.node.kind() {
                 "" => self.node.tag(),
                 kind => kind,
             };
             let place = || child.place();
             match child.name() {
+                "to_world" if child.tag() == "animation" => {
+                    let name = format!("motion of `{owner}` after its first pose");
+                    ignored.add_named(features::MI_ELEMENT, &name, place);
+                }
                 "" => {
                     let name = format!("`{}` in `{owner}`", child.tag());
                     ignored.add_named(features::MI_ELEMENT, &name, place);
@@ -159,7 +164,8 @@ pub(super) fn float(node: Node<'_>) -> Result<f32> {
 /// Finite number of an attribute or of a part of one.
 pub(super) fn number(node: Node<'_>, text: &str) -> Result<f64> {
     let text = text.trim();
-    let parsed: Option<f64> = text.parse().ok();
+    // Version 2 reads numbers as C does, with a suffix.
+    let parsed: Option<f64> = text.trim_end_matches('f').parse().ok();
     parsed.filter(|number| (*number as f32).is_finite()).ok_or_else(|| {
         node.error(format!("`{}`: expected a finite number, found `{text}`", node.name()))
     })
@@ -180,8 +186,11 @@ pub(super) fn turned(node: Node<'_>, matrix: DMat4, direction: DVec3) -> Result<
     direction.ok_or_else(|| node.error(NO_INVERSE))
 }
 
-/// Matrix of a `transform`.
+/// Matrix of a `transform`, or of the first one of an `animation`.
 pub(super) fn transform(node: Node<'_>) -> Result<DMat4> {
+    if let Some(pose) = node.children().find(|child| child.tag() == "transform") {
+        return transform(pose);
+    }
     let mut matrix = DMat4::IDENTITY;
     for child in node.children() {
         let next = match child.tag() {

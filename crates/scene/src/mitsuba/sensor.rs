@@ -34,8 +34,9 @@ impl Reader {
         sensors: &[Node<'_>],
         name: Option<&str>,
     ) -> Result<(Option<CameraEntry>, FilmSettings)> {
+        let is_rendered = |sensor: &Node<'_>| matches!(sensor.kind(), "perspective" | "thinlens");
         let chosen = match name {
-            None => 0,
+            None => sensors.iter().position(is_rendered).unwrap_or(0),
             Some(name) => {
                 let has_id = |sensor: &Node<'_>| sensor.attribute("id") == Some(name);
                 let by_number = || name.parse().ok().filter(|&index: &usize| index < sensors.len());
@@ -58,7 +59,7 @@ impl Reader {
             self.ignored.add(features::MI_SENSORS, || other.place());
         }
         let parameters = Parameters::new(sensor);
-        if !matches!(sensor.kind(), "perspective" | "thinlens") {
+        if !is_rendered(&sensor) {
             let found = sensor.kind();
             return Err(sensor.error(format!(
                 "the sensor `{found}` is not rendered; expected perspective or thinlens"
@@ -91,34 +92,35 @@ impl Reader {
         if parameters.boolean("hide_emitters")? == Some(true) {
             self.ignored.add(features::MI_HIDE_EMITTERS, || node.place());
         }
-        match node.kind() {
-            "direct" => self.asked.depth = Some(1),
+        let edges = match node.kind() {
+            "direct" => Some(2),
             // All find light along paths, however they do.
             "path" | "volpath" | "volpathmis" | "volpath_simple" | "bdpt" | "ptracer"
             | "pssmlt" | "mlt" | "erpt" | "photonmapper" | "ppm" | "sppm" | "prb"
             | "prbvolpath" | "prb_basic" | "path_guided" => {
-                // Mitsuba counts the edges of a path, the one to the light included.
-                self.asked.depth = match parameters.integer("max_depth")? {
-                    None | Some(-1) => Some(Asked::MAX_DEPTH),
-                    Some(edges) => {
-                        if edges < 2 {
-                            let name = "`max_depth` below 2, for which direct light is rendered";
-                            self.ignored.add_named(features::MI_INTEGRATOR, name, || node.place());
-                        }
-                        Some((edges - 1).clamp(1, i64::from(Asked::MAX_DEPTH)) as u32)
-                    }
-                };
-                let roulette = parameters.integer("rr_depth")?;
-                let roulette = roulette.and_then(|depth| u32::try_from(depth).ok());
-                self.asked.roulette_depth = roulette.or(self.asked.roulette_depth);
+                Some(parameters.integer("max_depth")?.unwrap_or(-1))
             }
             // The integrator in them has been read.
-            "aov" | "moment" | "adaptive" | "irrcache" | "stokes" => {}
+            "aov" | "moment" | "adaptive" | "irrcache" | "stokes" => None,
             kind => {
                 let name = format!("integrator `{kind}`");
                 self.ignored.add_named(features::MI_INTEGRATOR, &name, || node.place());
+                parameters.integer("max_depth")?
             }
+        };
+        if edges.is_some_and(|edges| edges < 2 && edges != -1) {
+            let name = "`max_depth` below 2, for which direct light is rendered";
+            self.ignored.add_named(features::MI_INTEGRATOR, name, || node.place());
         }
+        // Mitsuba counts the edges of a path, the one to the light included.
+        self.asked.depth = match edges {
+            None => self.asked.depth,
+            Some(-1) => Some(Asked::MAX_DEPTH),
+            Some(edges) => Some((edges - 1).clamp(1, i64::from(Asked::MAX_DEPTH)) as u32),
+        };
+        let roulette = parameters.integer("rr_depth")?;
+        let roulette = roulette.and_then(|depth| u32::try_from(depth).ok());
+        self.asked.roulette_depth = roulette.or(self.asked.roulette_depth);
         Ok(())
     }
 

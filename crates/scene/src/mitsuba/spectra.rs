@@ -112,7 +112,6 @@ fn rgb(node: Node<'_>, text: &str, is_encoded: bool) -> Result<Vec3> {
 pub(super) fn color_of_kind(node: Node<'_>, role: Role) -> Result<Vec3> {
     let parameters = Parameters::new(node);
     match node.kind() {
-        "" => {}
         "blackbody" => {
             let kelvin = parameters.required("temperature", parameters.float("temperature")?)?;
             let scale = parameters.float("scale")?.unwrap_or(1.0);
@@ -147,7 +146,7 @@ pub(super) fn color_of_kind(node: Node<'_>, role: Role) -> Result<Vec3> {
                 role,
             );
         }
-        found => return Err(node.error(format!("unknown spectrum of type `{found}`"))),
+        _ => {}
     }
     if let Some(name) = node.attribute("filename") {
         let path = node.file(name)?;

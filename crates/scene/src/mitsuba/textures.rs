@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::{
     Reader,
-    document::Node,
+    document::{Node, is_spectrum},
     parameters::Parameters,
     spectra::{self, Role},
 };
@@ -74,7 +74,7 @@ impl Reader {
                     self.unknown_texture(&format!("mesh_attribute` of `{name}"), node)
                 }
             }
-            "uniform" | "srgb" | "d65" => {
+            kind if is_spectrum(kind) => {
                 let color = spectra::color_of_kind(node, Role::Light)?;
                 return Ok(Value::Constant(color.max(Vec3::ZERO)));
             }
