@@ -1691,7 +1691,7 @@ fn text_that_would_exhaust_the_program_is_refused_soon() {
     }
     let message = Scene::load(&folder.write("a.xml", document(&text))).unwrap_err().to_string();
     assert!(message.contains("a value of more than 65536 characters"), "{message}");
-    let spheres = "<shape type=\"sphere\"/>".repeat(3000);
+    let spheres = "<shape type=\"sphere\"><emitter type=\"area\"/></shape>".repeat(3000);
     let message = refusal(&spheres);
     assert!(message.contains("the shapes of a scene may have"), "{message}");
 }

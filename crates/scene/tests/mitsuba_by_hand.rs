@@ -3,11 +3,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests may panic")]
 
+use std::collections::HashSet;
+
 use fenestra_scene::{
     Scene,
     material::{ConductorFresnel, MaterialKind},
 };
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::support::folder::Folder;
 
@@ -101,4 +103,26 @@ fn what_moves_stands_in_its_first_pose() {
     assert_eq!(Vec3::from(scene.geometry.positions[0]), Vec3::new(2.0, -1.0, 0.0));
     let expected = "motion of `rectangle` after its first pose (line 2)";
     assert!(scene.warnings[0].contains(expected), "{:?}", scene.warnings);
+}
+
+/// Pictures of point clouds are files of a ball for each point, often of a colour of its own.
+#[test]
+fn thousands_of_balls_are_copies_of_one() {
+    let ball = |index: usize| {
+        format!(
+            "<shape type=\"sphere\"><float name=\"radius\" value=\"0.5\"/><point name=\"center\" y=\"1\"/>\
+             <transform name=\"to_world\"><translate x=\"{index}\"/></transform>\
+             <boolean name=\"flip_normals\" value=\"{}\"/>\
+             <bsdf type=\"diffuse\"><float name=\"reflectance\" value=\"{}\"/></bsdf></shape>",
+            index.is_multiple_of(2),
+            index as f32 / 4000.0
+        )
+    };
+    let geometry = load(&(0..4000).map(ball).collect::<String>()).geometry;
+    assert_eq!(geometry.triangle_count(), 4000 * 16_128);
+    assert!(geometry.triangles.len() <= 1 << 20 && geometry.prototypes.len() == 2);
+    let last = geometry.instances.last().unwrap();
+    assert_eq!(last.affine().transform_point3(DVec3::X), DVec3::new(3999.5, 1.0, 0.0));
+    let colors: HashSet<_> = geometry.instances.iter().map(|ball| ball.first_material).collect();
+    assert_eq!(colors.len(), geometry.instances.len());
 }

@@ -59,7 +59,8 @@ struct Reader {
     geometry: Geometry,
     /// Shapes of groups by their element.
     shapes: HashMap<usize, Arc<Shape>>,
-    /// Prototypes of shapes of groups by their element, and by a transform that mirrors.
+    /// Prototypes of shapes of groups by their element, and by a transform that mirrors; that of balls last,
+    /// by the side that is out.
     prototypes: HashMap<(usize, bool), Prototype>,
     budget: Budget,
     /// Triangles of shapes that are not in a file, and of copies.

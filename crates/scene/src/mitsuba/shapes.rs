@@ -39,6 +39,11 @@ pub(super) struct Shape {
 }
 
 impl Shape {
+    /// True for a sphere, whose mesh is that of all others.
+    fn is_ball(&self, node: Node<'_>) -> bool {
+        node.kind() == "sphere" && self.mesh.tangents.is_empty()
+    }
+
     /// The mesh as it is under a transform that mirrors or not.
     fn turned(&self, mirrors: bool) -> Cow<'_, Mesh> {
         let mirrors_tangents = mirrors && !self.mesh.tangents.is_empty();
@@ -108,7 +113,9 @@ impl Reader {
         let matrix = outer * shape.to_world;
         // Surfaces that emit are placed: lamps are triangles in the world.
         let emits = self.materials[shape.material as usize].surface.emission.is_some();
-        if is_shared && !emits && self.budget.takes_instances(1, triangles) {
+        // Pictures of point clouds have thousands of balls, which are copies of one.
+        let is_copy = is_shared || shape.is_ball(node);
+        if is_copy && !emits && self.budget.takes_instances(1, triangles) {
             return self.add_instance(node, &shape, matrix);
         }
         if is_shared || !shape.is_file {
@@ -118,13 +125,17 @@ impl Reader {
         self.append(node, &shape, matrix)
     }
 
-    /// Adds an instance of a shape of a group, whose mesh is in memory once for each way to turn it.
+    /// Adds an instance of a shape of a group, or of a ball, whose mesh is in memory once for each way to
+    /// turn it.
     fn add_instance(&mut self, node: Node<'_>, shape: &Shape, matrix: DMat4) -> Result<()> {
         if self.geometry.instances.len() >= MAX_INSTANCES {
             return Err(node.error(format!("at most {MAX_INSTANCES} instances can be used")));
         }
         let transform = placement(node, matrix)?;
-        let key = (node.index, transform.mirrors);
+        let key = match shape.is_ball(node) {
+            true => (usize::MAX, shape.flips),
+            false => (node.index, transform.mirrors),
+        };
         let prototype = match self.prototypes.get(&key) {
             Some(prototype) => *prototype,
             None => {
@@ -197,8 +208,9 @@ impl Reader {
             "disk" => shape.mesh = quadrics::disk(1.0, 0.0),
             "sphere" => {
                 let center = parameters.vector("center")?.unwrap_or(Vec3::ZERO);
-                shape.mesh = quadrics::sphere(radius()?);
-                shape.to_world *= DMat4::from_translation(center.as_dvec3());
+                shape.mesh = quadrics::sphere(1.0);
+                shape.to_world *= DMat4::from_translation(center.as_dvec3())
+                    * DMat4::from_scale(DVec3::splat(f64::from(radius()?)));
                 // Mitsuba 3.9.1 turns mirrored spheres inside out, but no other round shape.
                 shape.flips ^= mirrors;
             }
