@@ -116,7 +116,6 @@ features! {
         "its height alone counts";
     PBRT_ASPECT "`frameaspectratio` other than that of the film" "pixels are square";
     PBRT_CURVE "exact form of `curve`" "tubes of 3 to 6 sides";
-    PBRT_PARTIAL "`phimax`, `zmin`, `zmax`, by shape" "quadrics are whole";
     PBRT_DISPLACEMENT "`displacement` of shapes, or beside a `normalmap`" "left out";
     PBRT_MISSING "files of shapes that are not there" "left out";
     PBRT_FLAT "shapes whose transformation flattens space" "left out";

@@ -15,37 +15,39 @@ const SEGMENTS: usize = 128;
 /// Rows of a sphere from pole to pole.
 const SPHERE_ROWS: usize = 64;
 
-/// Sphere about the origin, normals outward: u = φ/2π from +X towards +Y, v = θ/π from +Z.
-pub(crate) fn sphere(radius: f32) -> Mesh {
+/// Sphere about the origin, normals outward: u from 0 at +X towards +Y to 1 after the share `turns` of a
+/// turn, v from 0 to 1 between two angles from +Z.
+pub(crate) fn sphere(radius: f32, [first, last]: [f64; 2], turns: f64) -> Mesh {
     let radius = f64::from(radius);
     grid(SPHERE_ROWS, |u, v| {
-        let (turn, (sine, cosine)) = (turn(u), (PI * v).sin_cos());
+        let angle = first + (last - first) * v;
+        let (turn, (sine, cosine)) = (turn(turns * u), angle.sin_cos());
         // Single out the pole, where a sine is not exactly 0.
-        let sine = if v == 1.0 { 0.0 } else { sine };
+        let sine = if angle == PI { 0.0 } else { sine };
         let normal = (turn * sine).extend(cosine);
         Vertex { position: normal * radius, normal, uv: [u, v] }
     })
 }
 
-/// Ring about the origin in the plane z = 0, with the normal +Z: u = r/`radius`, v = φ/2π from +X
-/// towards +Y. An `inner_radius` of 0 makes a disk.
-pub(crate) fn disk(radius: f32, inner_radius: f32) -> Mesh {
+/// Ring about the origin in the plane z = 0, with the normal +Z: u = r/`radius`, v from 0 at +X towards +Y
+/// to 1 after the share `turns` of a turn. An `inner_radius` of 0 makes a disk.
+pub(crate) fn disk(radius: f32, inner_radius: f32, turns: f64) -> Mesh {
     let (radius, inner) = (f64::from(radius), f64::from(inner_radius));
     grid(1, |u, v| {
         let distance = inner + (radius - inner) * v;
-        let position = (turn(u) * distance).extend(0.0);
+        let position = (turn(turns * u) * distance).extend(0.0);
         Vertex { position, normal: DVec3::Z, uv: [distance / radius, u] }
     })
 }
 
-/// Open cylinder about the z axis, normals outward: u = φ/2π from +X towards +Y, v from 0 at `z_min`
-/// to 1 at `z_max`.
-pub(crate) fn cylinder(radius: f32, z_min: f32, z_max: f32) -> Mesh {
+/// Open cylinder about the z axis, normals outward: u from 0 at +X towards +Y to 1 after the share `turns` of
+/// a turn, v from 0 at `z_min` to 1 at `z_max`.
+pub(crate) fn cylinder(radius: f32, [z_min, z_max]: [f32; 2], turns: f64) -> Mesh {
     let (radius, z_min, z_max) = (f64::from(radius), f64::from(z_min), f64::from(z_max));
     grid(1, |u, v| {
         // Rows run from the top, so that columns × rows points outward.
-        let normal = turn(u).extend(0.0);
-        let position = (turn(u) * radius).extend(z_max + (z_min - z_max) * v);
+        let normal = turn(turns * u).extend(0.0);
+        let position = (normal * radius).with_z(z_max + (z_min - z_max) * v);
         Vertex { position, normal, uv: [u, 1.0 - v] }
     })
 }
@@ -101,7 +103,7 @@ fn turn(u: f64) -> DVec2 {
     DVec2::from_angle(TAU * (u % 1.0))
 }
 
-/// Surface over a grid of a full turn by `rows`; rows × columns (cross product) points outward.
+/// Surface over a grid of a turn, or part of one, by `rows`; rows × columns (cross product) points outward.
 ///
 /// Where a row has no extent, as at a pole, each of its triangles has a vertex of its own in the
 /// middle of the column: all directions meet there, and no one coordinate would do.

@@ -243,6 +243,10 @@ fn quadrics_and_patches_face_outward() {
         ("\"sphere\" \"float radius\" 2", 16.0 * PI),
         ("\"cylinder\" \"float zmin\" 0 \"float zmax\" 3", 6.0 * PI),
         ("\"disk\" \"float height\" 1 \"float innerradius\" 0.5", 0.75 * PI),
+        ("\"sphere\" \"float radius\" 2 \"float zmin\" 1 \"float phimax\" 180", 2.0 * PI),
+        ("\"sphere\" \"float zmin\" 0.5 \"float zmax\" -0.5", 2.0 * PI),
+        ("\"cylinder\" \"float phimax\" 90", PI),
+        ("\"disk\" \"float phimax\" 270", 0.75 * PI),
         ("\"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 2 0 2 2 0] \"integer faceIndices\" 3", 4.0),
         (
             r#""loopsubdiv" "integer levels" 1 "point3 P" [1 0 0 0 1 0 0 0 1]
@@ -266,6 +270,16 @@ fn quadrics_and_patches_face_outward() {
             assert!(normal(&scene, index).dot(outward) > 0.0, "{shape}");
         }
         assert!((sum - area).abs() < 0.02 * area.max(5.0), "{shape}: {sum} {area}");
+    }
+    // Parts begin at +X, and their coordinates end with them.
+    let quarter = world(
+        r#"Texture "t" "spectrum" "checkerboard" Material "diffuse" "texture reflectance" "t"
+        Shape "cylinder" "float phimax" 90 "float zmax" 3"#,
+    );
+    for (at, [u, v]) in positions(&quarter).iter().zip(&quarter.geometry.uvs[0]) {
+        let (sine, cosine) = (u * FRAC_PI_2).sin_cos();
+        let expected = Vec3::new(cosine, sine, 4.0 * v - 1.0);
+        assert!(at.abs_diff_eq(expected, 1e-5), "{at} {u} {v}");
     }
     let curved = world("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]");
     assert_eq!(curved.geometry.triangles.len(), 512);
@@ -1402,7 +1416,7 @@ fn everything_left_out_is_named_once() {
         MakeNamedMedium "fog" "string type" "homogeneous"
         MediumInterface "fog" ""
         Shape "sphere" "float phimax" 180 "float sharp" 1
-        Shape "sphere" "float phimax" 90 "float sharp" 1
+        Shape "sphere" "float sharp" 1
         Shape "curve" "point3 P" [0 0 0 1 1 1 2 2 2 3 3 3]
         Material "coateddiffuse" "float uroughness" 0.1 "float vroughness" 0.2 "rgb albedo" [1 0 0]
         Scale 1 0 1 {TRIANGLE}
@@ -1423,7 +1437,6 @@ fn everything_left_out_is_named_once() {
         "ignored sensor `canon_eos_100d` (line 4)",
         "ignored `maxcomponentvalue` of the film (line 4)",
         "ignored parameter `halffov` of Camera \"perspective\" (line 5)",
-        "ignored `phimax` of Shape \"sphere\" (2, first in line 10)",
         "ignored parameter `sharp` of Shape \"sphere\" (2, first in line 10)",
         "ignored exact form of `curve` (line 12): tubes of 3 to 6 sides",
         "ignored `albedo` of coats (line 13): coats are clear",

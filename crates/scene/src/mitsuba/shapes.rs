@@ -1,6 +1,6 @@
 //! Shapes → triangles in world space with their materials.
 
-use std::{borrow::Cow, sync::Arc};
+use std::{borrow::Cow, f64::consts::PI, sync::Arc};
 
 use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 
@@ -205,10 +205,10 @@ impl Reader {
                     shape.flips ^= mirrors;
                 }
             }
-            "disk" => shape.mesh = quadrics::disk(1.0, 0.0),
+            "disk" => shape.mesh = quadrics::disk(1.0, 0.0, 1.0),
             "sphere" => {
                 let center = parameters.vector("center")?.unwrap_or(Vec3::ZERO);
-                shape.mesh = quadrics::sphere(1.0);
+                shape.mesh = quadrics::sphere(1.0, [0.0, PI], 1.0);
                 shape.to_world *= DMat4::from_translation(center.as_dvec3())
                     * DMat4::from_scale(DVec3::splat(f64::from(radius()?)));
                 // Mitsuba 3.9.1 turns mirrored spheres inside out, but no other round shape.
@@ -219,7 +219,7 @@ impl Reader {
                     Ok(parameters.vector(name)?.unwrap_or(default).as_dvec3())
                 };
                 let (from, to) = (point("p0", Vec3::ZERO)?, point("p1", Vec3::Z)?);
-                shape.mesh = quadrics::cylinder(radius()?, 0.0, 1.0);
+                shape.mesh = quadrics::cylinder(radius()?, [0.0, 1.0], 1.0);
                 let Some(frame) = frame_along(to - from) else {
                     return Err(node.error("cylinder: expected `p0` and `p1` to differ"));
                 };

@@ -51,7 +51,7 @@ pub(super) fn mesh(entity: &Entity, strands: &mut Detail, log: &mut Log) -> Resu
                 .map_err(|message| entity.error(message))?
         }
         "bilinearmesh" => bilinear_mesh(entity, log)?,
-        "sphere" | "disk" | "cylinder" => quadric(entity, log)?,
+        "sphere" | "disk" | "cylinder" => quadric(entity)?,
         "curve" => curve(entity, strands, log)?,
         other => return Err(entity.error(format!("unknown shape `{other}`"))),
     };
@@ -126,25 +126,22 @@ fn triangle_mesh(entity: &Entity, log: &mut Log) -> Result<Mesh> {
     })
 }
 
-fn quadric(entity: &Entity, log: &mut Log) -> Result<Mesh> {
+fn quadric(entity: &Entity) -> Result<Mesh> {
     let radius = entity.number("radius", 1.0)? as f32;
     if !(radius > 0.0 && radius.is_finite()) {
         return Err(entity.error(format!("expected a radius above 0, found {radius}")));
     }
-    let mut partial = |name: &str, whole: f64| -> Result<()> {
-        if entity.number(name, whole)? != whole {
-            let part = format!("`{name}` of {}", entity.label());
-            log.ignore_named(features::PBRT_PARTIAL, &part, entity.place_of(name));
-        }
-        Ok(())
+    let turns = (entity.number("phimax", 360.0)? / 360.0).clamp(0.0, 1.0);
+    let limits = |size: f64| -> Result<[f64; 2]> {
+        let [a, b] = [entity.number("zmin", -size)?, entity.number("zmax", size)?];
+        Ok([a.min(b), a.max(b)])
     };
-    partial("phimax", 360.0)?;
     Ok(match entity.name.as_str() {
         "sphere" => {
             let radius = f64::from(radius);
-            partial("zmin", -radius)?;
-            partial("zmax", radius)?;
-            let mut mesh = quadrics::sphere(radius as f32);
+            let angle = |z: f64| (f64::from(z as f32) / radius).clamp(-1.0, 1.0).acos();
+            let [low, high] = limits(radius)?.map(angle);
+            let mut mesh = quadrics::sphere(radius as f32, [high, low], turns);
             // v runs from −z to +z.
             mesh.uvs[0].iter_mut().for_each(|uv| uv[1] = 1.0 - uv[1]);
             mesh
@@ -156,7 +153,7 @@ fn quadric(entity: &Entity, log: &mut Log) -> Result<Mesh> {
                 let message = "expected an `innerradius` from 0 to below the radius, found";
                 return Err(entity.error(format!("{message} {inner}")));
             }
-            let mut mesh = quadrics::disk(radius, inner);
+            let mut mesh = quadrics::disk(radius, inner, turns);
             mesh.positions.iter_mut().for_each(|position| position[2] += height);
             // u goes around, v from the rim inward.
             for uv in &mut mesh.uvs[0] {
@@ -164,10 +161,7 @@ fn quadric(entity: &Entity, log: &mut Log) -> Result<Mesh> {
             }
             mesh
         }
-        _ => {
-            let [a, b] = [entity.number("zmin", -1.0)?, entity.number("zmax", 1.0)?];
-            quadrics::cylinder(radius, a.min(b) as f32, a.max(b) as f32)
-        }
+        _ => quadrics::cylinder(radius, limits(1.0)?.map(|z| z as f32), turns),
     })
 }
 
