@@ -83,6 +83,8 @@
 //! - \[Burley 2020\] "Practical Hash-based Owen Scrambling", JCGT 9(4).
 //! - \[Chen & Asau 1974\] "On Generating Random Variates from an Empirical Distribution", AIIE
 //!   Transactions 6(2).
+//! - \[Chiang et al. 2016\] "A Practical and Controllable Hair and Fur Model for Production Path
+//!   Tracing", Computer Graphics Forum 35(2).
 //! - \[CIE 015:2018\] *Colorimetry*, fourth edition.
 //! - \[Cigolle et al. 2014\] "A Survey of Efficient Representations for Independent Unit Vectors",
 //!   JCGT 3(2).
@@ -118,6 +120,7 @@
 //! - \[IEC 61966-2-1:1999\] *Default RGB colour space – sRGB*.
 //! - \[ISO/CIE 11664-2:2022\] *Colorimetry – CIE standard illuminants*.
 //! - \[Jarzynski & Olano 2020\] "Hash Functions for GPU Rendering", JCGT 9(3).
+//! - \[Jensen et al. 2001\] "A Practical Model for Subsurface Light Transport", SIGGRAPH.
 //! - \[Joe & Kuo 2008\] "Constructing Sobol Sequences with Better Two-Dimensional Projections",
 //!   SIAM Journal on Scientific Computing 30(5).
 //! - \[Karlík et al. 2019\] "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance

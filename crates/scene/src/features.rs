@@ -122,8 +122,8 @@ features! {
     PBRT_COAT_INDEX "`interface.eta` other than 1.5" "the coat reflects as one of 1.5";
     PBRT_TRANSMISSION "images of `diffusetransmission` that differ"
         "the ratio of `reflectance` to `transmittance` is the same everywhere";
-    PBRT_SUBSURFACE "light below `subsurface`" "rendered as plastic";
-    PBRT_HAIR "parameters of `hair`" "rendered as diffuse of its `reflectance`, or 0.5";
+    PBRT_SUBSURFACE "light below `subsurface`" "plastic of the same albedo";
+    PBRT_HAIR "parameters of `hair`" "diffuse of its colour";
     PBRT_MIX_LOBES "gloss of `mix`"
         "one lobe of the mean roughness; images on other coordinates than the first count by their means";
     PBRT_MIX "the lesser part of `mix` with glass or a sheet" "the other one is the whole surface";

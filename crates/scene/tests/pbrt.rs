@@ -466,6 +466,58 @@ fn materials_are_the_nearest() {
 }
 
 #[test]
+fn what_lies_below_a_surface_gives_its_colour() {
+    let close = |found: Vec3, expected: [f32; 3], tolerance: f32| {
+        assert!(found.abs_diff_eq(Vec3::from_array(expected), tolerance), "{found} {expected:?}");
+    };
+    let plastic = |text: &str| match material(&format!("\"subsurface\" {text}")).kind {
+        MaterialKind::Plastic { diffuse, ior, .. } => (diffuse, ior),
+        other => panic!("{other:?}"),
+    };
+    // Diffuse reflectances as published with the coefficients.
+    for (name, ior, expected) in [
+        ("Skin1", 1.3, [0.44, 0.22, 0.13]),
+        ("Skin2", 1.3, [0.63, 0.44, 0.34]),
+        ("Marble", 1.5, [0.83, 0.79, 0.75]),
+        ("Ketchup", 1.3, [0.16, 0.01, 0.00]),
+        ("Spectralon", 1.3, [1.0; 3]),
+    ] {
+        let (diffuse, found) = plastic(&format!("\"string name\" \"{name}\" \"float eta\" {ior}"));
+        close(diffuse, expected, 0.01);
+        assert_eq!(found, ior);
+    }
+    // Milk without a word; reduced scattering leaves out what goes on forward.
+    let (milk, ior) = plastic("");
+    assert_eq!(ior, 1.33);
+    let own = plastic(
+        r#""rgb sigma_a" [0.0011 0.0024 0.014] "rgb sigma_s" [5.1 6.42 7.54] "float g" 0.5"#,
+    );
+    close(own.0, milk.to_array(), 1e-4);
+    close(plastic(r#""rgb reflectance" [0.1 0.2 0.3] "rgb mfp" [1 2 3]"#).0, [0.1, 0.2, 0.3], 0.0);
+    close(plastic(r#""string name" "Jam""#).0, [0.5; 3], 0.0);
+    for strange in [
+        r#""rgb sigma_a" [0 0 0] "rgb sigma_s" [0 0 0]"#,
+        r#""float eta" 4"#,
+        r#""float eta" 1.02 "float g" 7"#,
+    ] {
+        let (diffuse, _) = plastic(strange);
+        assert!((0.0..=1.0).contains(&diffuse.min_element()), "{strange} {diffuse}");
+        assert!((0.0..=1.0).contains(&diffuse.max_element()), "{strange} {diffuse}");
+    }
+
+    let hair = |text: &str| match material(&format!("\"hair\" {text}")).kind {
+        MaterialKind::Diffuse { reflectance } => reflectance,
+        other => panic!("{other:?}"),
+    };
+    // The width 0.3 makes 5.888 of the polynomial: (ln 0.5 / 5.888)² and so on.
+    close(hair(r#""rgb sigma_a" [0.013858 0.055432 0]"#), [0.5, 0.25, 1.0], 1e-3);
+    close(hair(r#""float pheomelanin" 0"#), [1.0; 3], 1e-6);
+    let [brown, fair] = [hair(""), hair(r#""float eumelanin" 0.13"#)];
+    close(brown, fair.map(|share| share.powf(10_f32.sqrt())).to_array(), 1e-5);
+    assert!(fair.x > 1.4 * fair.y && fair.y > 1.4 * fair.z, "{fair}");
+}
+
+#[test]
 fn mixtures_and_surfaces_that_are_not_there() {
     let text = format!(
         r#"MakeNamedMaterial "red" "string type" "diffuse" "rgb reflectance" [1 0 0]

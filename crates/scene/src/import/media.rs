@@ -1,6 +1,6 @@
 //! Media and illuminants by the names that Mitsuba and pbrt-v4 give them.
 
-use glam::{DVec3, dvec3};
+use glam::{DVec3, Vec3, dvec3};
 
 use crate::spectrum::rgb_from_xyz;
 
@@ -30,6 +30,12 @@ pub(crate) fn index(name: &str) -> Option<DVec3> {
         "k" => Some(k),
         _ => None,
     }
+}
+
+/// Absorption and reduced scattering coefficients of a medium below a surface, by pbrt's name.
+pub(crate) fn scattering(name: &str) -> Option<[Vec3; 2]> {
+    let found = SCATTERING.iter().find(|(own, _)| *own == name)?;
+    Some(found.1.map(Vec3::from_array))
 }
 
 /// Linear Rec.709 colour of an illuminant with luminance 1, by pbrt's name.
@@ -141,4 +147,20 @@ const ILLUMINANTS: [(&str, f64, f64); 16] = [
     ("stdillum-F10", 0.3458, 0.3588),
     ("stdillum-F11", 0.3805, 0.3769),
     ("stdillum-F12", 0.4370, 0.4042),
+];
+
+/// Absorption and reduced scattering coefficients, per millimetre \[Jensen et al. 2001\].
+const SCATTERING: [(&str, [[f32; 3]; 2]); 12] = [
+    ("Apple", [[0.003, 0.0034, 0.046], [2.29, 2.39, 1.97]]),
+    ("Chicken1", [[0.015, 0.077, 0.19], [0.15, 0.21, 0.38]]),
+    ("Chicken2", [[0.018, 0.088, 0.2], [0.19, 0.25, 0.32]]),
+    ("Cream", [[0.0002, 0.0028, 0.0163], [7.38, 5.47, 3.15]]),
+    ("Ketchup", [[0.061, 0.97, 1.45], [0.18, 0.07, 0.03]]),
+    ("Marble", [[0.0021, 0.0041, 0.0071], [2.19, 2.62, 3.0]]),
+    ("Potato", [[0.0024, 0.009, 0.12], [0.68, 0.7, 0.55]]),
+    ("Skimmilk", [[0.0014, 0.0025, 0.0142], [0.7, 1.22, 1.9]]),
+    ("Skin1", [[0.032, 0.17, 0.48], [0.74, 0.88, 1.01]]),
+    ("Skin2", [[0.013, 0.07, 0.145], [1.09, 1.59, 1.79]]),
+    ("Spectralon", [[0.0, 0.0, 0.0], [11.6, 20.4, 14.9]]),
+    ("Wholemilk", [[0.0011, 0.0024, 0.014], [2.55, 3.21, 3.77]]),
 ];

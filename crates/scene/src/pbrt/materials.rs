@@ -81,7 +81,12 @@ impl<'a> Materials<'a> {
             }
             "coateddiffuse" => {
                 self.layers(entity)?;
-                self.plastic(entity, &mut surface)?
+                let value = self.textures.spectrum(entity, "reflectance")?;
+                let ior = self.ior(entity, "eta", DEFAULT_IOR, (SOLID_IOR.0, COAT_IOR.1))?;
+                let base = value.unwrap_or(Value::number(0.5));
+                let shown =
+                    if ior < COAT_IOR.0 { base } else { base.mapped(albedo_below_coat(ior)) };
+                self.plastic(entity, shown, ior, &mut surface)?
             }
             "conductor" => self.conductor(entity, "", &mut surface)?,
             "coatedconductor" => {
@@ -92,10 +97,10 @@ impl<'a> Materials<'a> {
                 let roughness = self.round_roughness(entity, "")?;
                 surface.roughness = roughness.texture;
                 let alpha = if roughness.alpha < SMOOTH_ALPHA { 0.0 } else { roughness.alpha };
-                MaterialKind::glass(self.ior(entity, "eta", SOLID_IOR)?, alpha)
+                MaterialKind::glass(self.ior(entity, "eta", DEFAULT_IOR, SOLID_IOR)?, alpha)
             }
             "thindielectric" => MaterialKind::ThinDielectric {
-                ior: self.ior(entity, "eta", SOLID_IOR)?,
+                ior: self.ior(entity, "eta", DEFAULT_IOR, SOLID_IOR)?,
                 reflectance: Vec3::ONE,
                 transmittance: Vec3::ONE,
             },
@@ -113,19 +118,13 @@ impl<'a> Materials<'a> {
                 kind
             }
             "subsurface" => {
-                self.textures.log.ignore(features::PBRT_SUBSURFACE, &entity.place);
-                entity.without_effect("name mfp sigma_a sigma_s g scale");
-                self.plastic(entity, &mut surface)?
+                let ior = self.ior(entity, "eta", 1.33, (SOLID_IOR.0, COAT_IOR.1))?;
+                let shown = self.albedo_below(entity, ior)?;
+                self.plastic(entity, shown, ior, &mut surface)?
             }
             "hair" => {
                 self.textures.log.ignore(features::PBRT_HAIR, &entity.place);
-                entity
-                    .without_effect("sigma_a color eumelanin pheomelanin eta beta_m beta_n alpha");
-                let value = match self.textures.spectrum(entity, "reflectance")? {
-                    None => self.textures.spectrum(entity, "color")?,
-                    found => found,
-                };
-                let reflectance = color(value.unwrap_or(Value::number(0.5)), &mut surface);
+                let reflectance = color(self.hair(entity)?, &mut surface);
                 MaterialKind::Diffuse { reflectance }
             }
             "mix" => return self.mix(entity, name),
@@ -174,23 +173,73 @@ impl<'a> Materials<'a> {
         Ok(())
     }
 
-    fn plastic(&mut self, entity: &Entity, surface: &mut Surface) -> Result<MaterialKind> {
-        let value = self.textures.spectrum(entity, "reflectance")?;
-        let ior = self.ior(entity, "eta", (SOLID_IOR.0, COAT_IOR.1))?;
-        let mut diffuse = color(value.unwrap_or(Value::number(0.5)), surface);
+    /// Plastic that shows an albedo below its coat.
+    fn plastic(
+        &mut self,
+        entity: &Entity,
+        shown: Value,
+        ior: f32,
+        surface: &mut Surface,
+    ) -> Result<MaterialKind> {
+        let diffuse = color(shown, surface);
         // Such a coat reflects next to nothing.
         if ior < COAT_IOR.0 {
             entity.without_effect("roughness uroughness vroughness remaproughness");
             return Ok(MaterialKind::Diffuse { reflectance: diffuse });
         }
-        let below = albedo_below_coat(ior);
-        match &mut surface.color {
-            Some(texture) => *texture = texture.mapped(below),
-            None => diffuse = diffuse.map(below),
-        }
         let roughness = self.round_roughness(entity, "")?;
         surface.roughness = roughness.texture;
         Ok(MaterialKind::Plastic { diffuse, alpha: roughness.alpha, ior })
+    }
+
+    /// Albedo of `subsurface` by what scatters below it: a medium by its name or coefficients, milk without
+    /// any, else its `reflectance`.
+    fn albedo_below(&mut self, entity: &Entity, ior: f32) -> Result<Value> {
+        let log = &mut self.textures.log;
+        log.ignore(features::PBRT_SUBSURFACE, &entity.place);
+        entity.without_effect("mfp scale");
+        let share = 1.0 - entity.number("g", 0.0)? as f32;
+        let of = |name: &str| match entity.find(name) {
+            Some(found) if found.kind != Kind::Texture => spectra::index(found, log).map(Some),
+            _ => Ok(None),
+        };
+        let (own, reflectance) =
+            ([of("sigma_a")?, of("sigma_s")?], self.textures.spectrum(entity, "reflectance")?);
+        let [absorption, scattering] = match (entity.string("name")?, own, reflectance) {
+            (None, [Some(absorption), Some(scattering)], _) => [absorption, share * scattering],
+            (None, _, Some(reflectance)) => return Ok(reflectance),
+            (name, ..) => match media::scattering(name.unwrap_or("Wholemilk")) {
+                Some(found) => found,
+                None => return Ok(Value::number(0.5)),
+            },
+        };
+        Ok(Value::Constant(diffusion_albedo(scattering / (absorption + scattering), ior)))
+    }
+
+    /// Colour of much hair, by its absorption, its colour or its pigments \[Chiang et al. 2016\].
+    fn hair(&mut self, entity: &Entity) -> Result<Value> {
+        entity.without_effect("eta beta_m alpha");
+        let mut number =
+            |name: &str| Ok(self.textures.number(entity, name)?.map(|value| value.mean().x));
+        let b = number("beta_n")?.unwrap_or(0.3);
+        let [dark, red] = match [number("eumelanin")?, number("pheomelanin")?] {
+            [None, None] => [1.3, 0.0],
+            pigments => pigments.map(|amount| amount.unwrap_or(0.0)),
+        };
+        let own = match self.textures.spectrum(entity, "reflectance")? {
+            None => self.textures.spectrum(entity, "color")?,
+            found => found,
+        };
+        let absorption = match entity.find("sigma_a").filter(|found| found.kind != Kind::Texture) {
+            Some(found) => spectra::index(found, &self.textures.log)?,
+            None => match own {
+                Some(own) => return Ok(own),
+                None => dark * Vec3::new(0.419, 0.697, 1.37) + red * Vec3::new(0.187, 0.4, 1.05),
+            },
+        };
+        let width = 5.969 + b * (-0.215 + b * (2.532 + b * (-10.73 + b * (5.574 + b * 0.245))));
+        let color = |sigma: f32| (-width * sigma.max(0.0).sqrt()).exp().min(1.0);
+        Ok(Value::Constant(absorption.map(color)))
     }
 
     fn conductor(
@@ -239,7 +288,7 @@ impl<'a> Materials<'a> {
 
     /// Metal below a coat, seen from inside of which it reflects less than from the air.
     fn coated_conductor(&mut self, entity: &Entity, surface: &mut Surface) -> Result<MaterialKind> {
-        let ior = self.ior(entity, "interface.eta", (SOLID_IOR.0, COAT_IOR.1))?;
+        let ior = self.ior(entity, "interface.eta", DEFAULT_IOR, (SOLID_IOR.0, COAT_IOR.1))?;
         if (ior - DEFAULT_IOR).abs() > 0.01 {
             self.textures.log.ignore(features::PBRT_COAT_INDEX, &entity.place);
         }
@@ -260,9 +309,15 @@ impl<'a> Materials<'a> {
     }
 
     /// Refractive index, a number or the mean of a spectrum.
-    fn ior(&self, entity: &Entity, name: &str, (low, high): (f32, f32)) -> Result<f32> {
+    fn ior(
+        &self,
+        entity: &Entity,
+        name: &str,
+        otherwise: f32,
+        (low, high): (f32, f32),
+    ) -> Result<f32> {
         let kinds = [Kind::Float, Kind::Rgb, Kind::Spectrum];
-        let Some(parameter) = entity.find_of(name, &kinds)? else { return Ok(1.5) };
+        let Some(parameter) = entity.find_of(name, &kinds)? else { return Ok(otherwise) };
         let ior = match (parameter.kind, parameter.numbers()) {
             (Kind::Float, [ior, ..]) => *ior as f32,
             _ => spectra::index(parameter, &self.textures.log)?.element_sum() / 3.0,
@@ -356,6 +411,20 @@ impl<'a> Materials<'a> {
         }
         Ok(Some(material))
     }
+}
+
+/// Diffuse reflectance of a medium of the reduced albedo `albedo` by the dipole of \[Jensen et al. 2001\],
+/// with their fit to what a surface of refractive index `ior` throws back inside.
+fn diffusion_albedo(albedo: Vec3, ior: f32) -> Vec3 {
+    let inside = -1.44 / (ior * ior) + 0.71 / ior + 0.668 + 0.0636 * ior;
+    let inside = inside.clamp(0.0, 0.99);
+    let boundary = (1.0 + inside) / (1.0 - inside);
+    albedo.clamp(Vec3::ZERO, Vec3::ONE).map(|albedo| {
+        let depth = (3.0 * (1.0 - albedo)).sqrt();
+        let shown = 0.5 * albedo * (1.0 + (-4.0 / 3.0 * boundary * depth).exp()) * (-depth).exp();
+        // A medium that does nothing has no albedo.
+        shown.min(1.0)
+    })
 }
 
 pub(super) fn set_opacity(surface: &mut Surface, value: Value) {
