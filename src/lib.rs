@@ -130,6 +130,7 @@
 //! - \[Knuth 1997\] *The Art of Computer Programming*, volume 2, third edition, section 4.2.2.
 //! - \[Laine & Karras 2011\] "Stratified Sampling for Stochastic Transparency", Computer Graphics
 //!   Forum 30(4).
+//! - \[Lam 1985\] "Metamerism and Colour Constancy", PhD thesis, University of Bradford.
 //! - \[Lavenberg & Welch 1981\] "A Perspective on the Use of Control Variables to Increase the
 //!   Efficiency of Monte Carlo Simulations", Management Science 27(3).
 //! - \[Matusik et al. 2003\] "A Data-Driven Reflectance Model", ACM Transactions on Graphics

@@ -103,10 +103,12 @@ features! {
     PBRT;
     PBRT_GAMUT "saturation of reflectance spectra beyond Rec.709" "clipped";
     PBRT_FILM "other parameters of the film"
-        "`xresolution`, `yresolution` and `iso` are done; open time times `iso`/100 scales all light";
+        "size, crop, `iso` and `whitebalance` are done; open time times `iso`/100 scales all light";
     PBRT_INTEGRATOR "other integrators than path tracers, by name" "";
     PBRT_FILTER "`PixelFilter` other than a box of 0.5 and a Gaussian of 1.5, by name"
         "a Gaussian of 1.5, or the box";
+    PBRT_CAMERA "cameras other than `perspective`, by name"
+        "in 90° from their place, `orthographic` ones from afar";
     PBRT_SENSOR "`sensor` other than `cie1931`" "";
     PBRT_OPTION "`Option`, by name" "";
     PBRT_COLOR_SPACE "`ColorSpace` other than `srgb`" "colours are those of Rec.709";

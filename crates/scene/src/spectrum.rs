@@ -15,6 +15,13 @@ const RGB_FROM_XYZ: DMat3 = DMat3::from_cols(
     dvec3(-0.498535, 0.041556, 1.057311),
 );
 
+/// Cone responses from CIE XYZ \[Lam 1985\], by columns.
+const CONES_FROM_XYZ: DMat3 = DMat3::from_cols(
+    dvec3(0.8951, -0.7502, 0.0389),
+    dvec3(0.2664, 1.7135, -0.0685),
+    dvec3(-0.1614, 0.0367, 1.0296),
+);
+
 /// Second constant of Planck's law hc/k, metre kelvins, and the first for radiance, 2hc², W m².
 const PLANCK_SECOND: f64 = 1.438_776_877e-2;
 const PLANCK_FIRST: f64 = 1.191_042_972e-16;
@@ -88,6 +95,28 @@ pub(crate) fn light_color(power: impl Fn(f64) -> f64) -> Option<DVec3> {
 pub(crate) fn planck(wavelength_nm: f64, kelvin: f64) -> f64 {
     let metres = wavelength_nm * 1e-9;
     1e-9 * PLANCK_FIRST / (metres.powi(5) * (PLANCK_SECOND / (metres * kelvin)).exp_m1())
+}
+
+/// Matrix of linear Rec.709 colours that makes white of light of a temperature, in the cone responses of
+/// \[Lam 1985\]: daylight \[CIE 015:2018\] from 4000 K, a black body below.
+pub(crate) fn white_balance(kelvin: f64) -> DMat3 {
+    // The scale of temperatures has moved since the illuminants were defined.
+    let kelvin = kelvin * 1.4388 / 1.438;
+    let white = if kelvin < 4000.0 {
+        let found = xyz(|nm| planck(nm, kelvin), |_| 1.0);
+        found / found.y
+    } else {
+        let [a, b, c, d] = match kelvin {
+            ..=7000.0 => [-4.607e9, 2.9678e6, 99.11, 0.244063],
+            _ => [-2.0064e9, 1.9018e6, 247.48, 0.23704],
+        };
+        let x = ((a / kelvin + b) / kelvin + c) / kelvin + d;
+        let y = (2.87 - 3.0 * x) * x - 0.275;
+        dvec3(x / y, 1.0, (1.0 - x - y) / y)
+    };
+    let cones_from_rgb = CONES_FROM_XYZ * RGB_FROM_XYZ.inverse();
+    let gains = cones_from_rgb * DVec3::ONE / (CONES_FROM_XYZ * white);
+    cones_from_rgb.inverse() * DMat3::from_diagonal(gains) * cones_from_rgb
 }
 
 /// Weights w such that Σ w_j·s(λ_j) is the linear sRGB colour of a reflectance spectrum s sampled

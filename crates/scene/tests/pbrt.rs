@@ -155,6 +155,38 @@ fn fov_is_that_of_the_shorter_side_and_lenses_scale() {
 }
 
 #[test]
+fn other_cameras_look_from_their_place() {
+    let seen = |kind: &str| {
+        let film = r#"Film "rgb" "integer xresolution" 200 "integer yresolution" 100"#;
+        let scene = load(&format!("{film} LookAt 0 0 -5 0 0 0 0 1 0 Camera {kind}"), TRIANGLE);
+        let found = warnings(&scene);
+        let expected = kind.split('"').nth(1).unwrap();
+        let named = format!("ignored Camera `{expected}`, seen as `perspective` (line 1)");
+        assert_eq!(found, [named.as_str(), DARK]);
+        scene.camera
+    };
+    for kind in [
+        r#""spherical" "string mapping" "equirectangular""#,
+        r#""realistic" "string lensfile" "a.dat" "float aperturediameter" 8 "float focusdistance" 2"#,
+    ] {
+        let camera = seen(kind);
+        assert_eq!(camera.position, Vec3::new(0.0, 0.0, 5.0));
+        assert!((camera.vertical_fov_deg - 90.0).abs() < 1e-4, "{camera:?}");
+    }
+    // All of the window shows at the depth of the triangle, from so far that depth counts little.
+    let camera = seen(r#""orthographic" "float screenwindow" [-4 4 -1 3]"#);
+    for (point, expected) in [
+        ([-4.0, -1.0, 0.0], [0.0, 0.0]),
+        ([4.0, 3.0, 0.0], [1.0, 1.0]),
+        ([4.0, 3.0, -4.0], [1.0, 1.0]),
+    ] {
+        let found = project(&camera, 2.0, Vec3::from(point))
+            - Vec2::from(camera.shift) * Vec2::new(0.5, 1.0);
+        assert!(found.abs_diff_eq(Vec2::from(expected), 0.02), "{point:?}: {found}");
+    }
+}
+
+#[test]
 fn the_film_scales_light_and_chooses_the_filter() {
     let head = r#"Film "rgb" "float iso" 200 "string filename" "a.exr" PixelFilter "box" "float xradius" 0.5
         Camera "perspective" "float shutterclose" 0.25"#;
@@ -170,6 +202,29 @@ fn the_film_scales_light_and_chooses_the_filter() {
     // A sky of radiance 1 lights the ground by π.
     let lit = world(r#"LightSource "infinite" "float illuminance" 6.2831853"#);
     assert_eq!(lit.environment.texels[0], Vec3::splat(2.0));
+    // Light of the temperature for which the white is balanced is white.
+    for (kelvin, light) in [
+        (5000, r#""spectrum L" "stdillum-D50""#),
+        (6500, r#""rgb L" [1 1 1]"#),
+        (2855, r#""spectrum L" "stdillum-A""#),
+        (3000, r#""blackbody L" 3000"#),
+    ] {
+        let film = format!("Film \"rgb\" \"float iso\" 50 \"float whitebalance\" {kelvin}");
+        let head = format!("{film} Camera \"perspective\"");
+        let world = format!("LightSource \"infinite\" {light} LightSource \"point\"");
+        let scene = load(&head, &world);
+        let white = scene.environment.texels[0];
+        assert!(white.abs_diff_eq(Vec3::splat(0.5), 3e-3), "{kelvin}: {white}");
+        let LampKind::Point { intensity, .. } = scene.lamps[0].kind else { panic!() };
+        assert!(kelvin > 6000 || intensity.x < intensity.z, "{kelvin}: {intensity}");
+        assert_eq!(warnings(&scene), [""; 0]);
+    }
+    let [below, above] = [6996, 6997].map(|kelvin| {
+        let film = format!("Film \"rgb\" \"float whitebalance\" {kelvin}");
+        let head = format!("{film} Camera \"perspective\"");
+        load(&head, r#"LightSource "infinite""#).environment.texels[0]
+    });
+    assert!(below.x > 1.0 && below.abs_diff_eq(above, 1e-3), "{below} {above}");
     let other = load(r#"PixelFilter "mitchell" Camera "perspective""#, "");
     assert_eq!(other.film.filter, Filter::Gaussian);
     assert!(warnings(&other)[0].contains("PixelFilter `mitchell`"), "{:?}", other.warnings);
@@ -1308,7 +1363,7 @@ fn bad_text_is_one_error_with_file_line_and_column() {
     for (text, expected) in [
         ("", "the file ends before WorldBegin"),
         ("WorldBegin", "expected triangles or a camera, found neither"),
-        ("Camera \"orthographic\" WorldBegin", "expected a perspective camera"),
+        ("Camera \"fisheye\" WorldBegin", "expected a perspective camera"),
         ("Scale 0 1 1 Camera \"perspective\" WorldBegin", "flattens space"),
         ("Shape \"sphere\" WorldBegin", "Shape before WorldBegin"),
     ] {

@@ -1,20 +1,22 @@
 //! Camera, film and filter of a scene description.
 
-use glam::{DMat4, DVec2, DVec3};
+use glam::{DMat3, DMat4, DVec2, DVec3, Mat3};
 
 use super::{
     directives::Description,
     parameters::{Entity, Kind, Log},
 };
-use crate::{FilmSettings, Filter, error::Result, features, file::CameraEntry};
+use crate::{
+    FilmSettings, Filter, error::Result, features, file::CameraEntry, spectrum::white_balance,
+};
 
 /// Viewer and image plane.
 pub(super) struct View {
     /// Camera in the space of the renderer, if the file has one.
     pub camera: Option<CameraEntry>,
     pub film: FilmSettings,
-    /// Radiance of the picture over that of the scene.
-    pub exposure: f32,
+    /// Light of the picture from that of the scene.
+    pub sensor: Mat3,
     /// Renderer from the world of the file: the identity or a mirror.
     pub mirror: DMat4,
 }
@@ -25,13 +27,19 @@ pub(super) struct View {
 /// left-handed world. The renderer is right-handed. If the camera does not mirror already, the whole
 /// world is mirrored in z, and the picture is the same.
 pub(super) fn view(description: &Description, log: &mut Log) -> Result<View> {
-    let (film, mut exposure, crop) = film(description, log)?;
+    let (film, mut sensor, crop) = film(description, log)?;
     let left_handed = DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0));
     let Some((entity, camera_from_world)) = &description.camera else {
-        return Ok(View { camera: None, film, exposure, mirror: left_handed });
+        return Ok(View { camera: None, film, sensor, mirror: left_handed });
     };
-    if entity.name != "perspective" {
-        return Err(entity.error("expected a perspective camera; others cannot be used"));
+    match entity.name.as_str() {
+        "perspective" => {}
+        "orthographic" | "spherical" | "realistic" => {
+            let name = format!("Camera `{}`, seen as `perspective`", entity.name);
+            log.ignore_named(features::PBRT_CAMERA, &name, &entity.place);
+            entity.without_effect("mapping lensfile aperturediameter aperture focusdistance");
+        }
+        _ => return Err(entity.error("expected a perspective camera")),
     }
     let world_from_camera = camera_from_world.inverse();
     let determinant = world_from_camera.determinant();
@@ -44,16 +52,19 @@ pub(super) fn view(description: &Description, log: &mut Log) -> Result<View> {
     if time <= 0.0 {
         return Err(entity.error("the shutter closes before it opens"));
     }
-    exposure *= time as f32;
-    let (vertical_fov_deg, shift) = window(entity, &crop, log)?;
-    let renderer_from_camera = mirror * world_from_camera;
+    sensor *= time as f32;
+    let (vertical_fov_deg, shift, back) = window(entity, &crop, log)?;
+    let moved_back = DMat4::from_translation(-back * DVec3::Z);
+    let renderer_from_camera = mirror * world_from_camera * moved_back;
     let position = renderer_from_camera.w_axis.truncate();
     let axis = |axis: DVec3| renderer_from_camera.transform_vector3(axis);
     // Look at a point so far away that single precision keeps the direction.
     let distance = position.length().max(1.0);
     let forward = axis(DVec3::Z);
-    let aperture_radius = entity.number("lensradius", 0.0)? * axis(DVec3::X).length();
-    let focus_distance = entity.number("focaldistance", 1e6)? * forward.length();
+    let focal = entity.number("focaldistance", 1e6)?;
+    let lens = entity.number("lensradius", 0.0)? * (1.0 + back / focal.max(1e-6));
+    let aperture_radius = lens * axis(DVec3::X).length();
+    let focus_distance = (focal + back) * forward.length();
     let camera = CameraEntry {
         position: position.as_vec3().to_array(),
         look_at: (position + distance * forward.normalize_or_zero()).as_vec3().to_array(),
@@ -65,7 +76,7 @@ pub(super) fn view(description: &Description, log: &mut Log) -> Result<View> {
         mirrored: false,
     };
     log.unused(entity);
-    Ok(View { camera: Some(camera), film, exposure, mirror })
+    Ok(View { camera: Some(camera), film, sensor, mirror })
 }
 
 /// Part of a film that is rendered.
@@ -76,9 +87,9 @@ struct Crop {
     bounds: [DVec2; 2],
 }
 
-/// Field of view from bottom to top, degrees, and shift of the lens; `fov` is that of the shorter side of the
-/// whole film.
-fn window(entity: &Entity, crop: &Crop, log: &mut Log) -> Result<(f64, [f64; 2])> {
+/// Field of view from bottom to top, degrees, shift of the lens, and the way back from which it sees as an
+/// orthographic camera does; `fov` is that of the shorter side of the whole film.
+fn window(entity: &Entity, crop: &Crop, log: &mut Log) -> Result<(f64, [f64; 2], f64)> {
     let aspect = crop.whole.x / crop.whole.y;
     let fov = entity.number("fov", 90.0)?;
     if !(fov > 0.0 && fov < 180.0) {
@@ -104,15 +115,21 @@ fn window(entity: &Entity, crop: &Crop, log: &mut Log) -> Result<(f64, [f64; 2])
     let [low, high] = crop.bounds;
     let share = (high.y - low.y) / crop.whole.y;
     let middle = (0.5 * (low + high) - 0.5 * crop.whole) / crop.whole.y;
-    let tangent = (0.5 * fov).to_radians().tan() * 0.5 * height * share;
+    // From so many heights away, rays that meet in the camera are all but parallel.
+    const FAR: f64 = 100.0;
+    let (half, back) = match entity.name.as_str() {
+        "orthographic" => (1.0 / (FAR * height), FAR * height),
+        _ => ((0.5 * fov).to_radians().tan(), 0.0),
+    };
+    let tangent = half * 0.5 * height * share;
     let shift = (shift + DVec2::new(middle.x, -middle.y)) / share;
-    Ok(((2.0 * tangent.atan()).to_degrees(), shift.to_array()))
+    Ok(((2.0 * tangent.atan()).to_degrees(), shift.to_array(), back))
 }
 
-/// Film, the factor of its sensor, and the part that the film is of a whole one.
-fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, Crop)> {
+/// Film, the light that its sensor makes of that of the scene, and the part that the film is of a whole one.
+fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, Mat3, Crop)> {
     let mut film = FilmSettings { width: 1280, height: 720, filter: filter(description, log)? };
-    let mut exposure = 1.0;
+    let mut sensor = Mat3::IDENTITY;
     let mut bounds = None;
     if let Some(entity) = &description.film {
         let side = |name: &str, otherwise: u32| {
@@ -125,9 +142,16 @@ fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, 
         film.width = side("xresolution", film.width)?;
         film.height = side("yresolution", film.height)?;
         // With iso 100 and an open time of 1, the sensor `cie1931` gives radiance as it is.
-        exposure = (entity.number("iso", 100.0)? / 100.0) as f32;
+        let exposure = entity.number("iso", 100.0)? / 100.0;
         if !(exposure >= 0.0 && exposure.is_finite()) {
             return Err(entity.error("`iso`: expected a number of at least 0"));
+        }
+        let kelvin = entity.number("whitebalance", 0.0)?;
+        let balance = if kelvin > 0.0 { white_balance(kelvin) } else { DMat3::IDENTITY };
+        sensor = (balance * exposure).as_mat3();
+        if !sensor.is_finite() {
+            let message = format!("`whitebalance`: expected a temperature, found {kelvin}");
+            return Err(entity.error(message));
         }
         if let Some(sensor) = entity.find("sensor")
             && sensor.text() != "cie1931"
@@ -143,10 +167,8 @@ fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, 
             let pixel = |x, y| (DVec2::new(x, y) * size).ceil();
             bounds = Some([pixel(left, top), pixel(right, bottom)]);
         }
-        for name in ["whitebalance", "maxcomponentvalue"] {
-            let part = format!("`{name}` of the film");
-            log.ignore_named(features::PBRT_FILM, &part, entity.place_of(name));
-        }
+        let most = entity.place_of("maxcomponentvalue");
+        log.ignore_named(features::PBRT_FILM, "`maxcomponentvalue` of the film", most);
         // No part of the picture.
         entity.without_effect("filename savefp16 diagonal coordinatesystem");
         log.unused(entity);
@@ -158,7 +180,7 @@ fn film(description: &Description, log: &mut Log) -> Result<(FilmSettings, f32, 
         return Err(entity.error(format!("expected a crop of at least a pixel, found {size}")));
     }
     (film.width, film.height) = (size.x as u32, size.y as u32);
-    Ok((film, exposure, Crop { whole, bounds: [low, high] }))
+    Ok((film, sensor, Crop { whole, bounds: [low, high] }))
 }
 
 fn filter(description: &Description, log: &mut Log) -> Result<Filter> {

@@ -36,11 +36,17 @@ fn color(entity: &Entity, name: &str, textures: &Textures) -> Result<Vec3> {
     found.map_or(Ok(Vec3::ONE), |parameter| spectra::light(parameter, &textures.log))
 }
 
+/// Light in the picture; the balance of white may leave the colours that there are.
+fn exposed(sensor: Mat3, light: Vec3) -> Vec3 {
+    let shown = sensor * light;
+    if light.is_finite() && light.min_element() >= 0.0 { shown.max(Vec3::ZERO) } else { shown }
+}
+
 /// Reads the emission of a shape with this area, in the units of the scene.
 pub(super) fn area_light(
     entity: &Entity,
     area: f64,
-    exposure: f32,
+    sensor: Mat3,
     textures: &mut Textures,
 ) -> Result<Emission> {
     if entity.name != "diffuse" {
@@ -58,7 +64,7 @@ pub(super) fn area_light(
         let message = "expected either `L` or `filename`, found both";
         return Err(color.place.error(format!("{}: {message}", entity.label())));
     }
-    let radiance = color(entity, "L", textures)? * scale as f32 * exposure;
+    let radiance = exposed(sensor, color(entity, "L", textures)? * scale as f32);
     textures.log.unused(entity);
     if !radiance.is_finite() || radiance.min_element() < 0.0 {
         return Err(
@@ -74,7 +80,7 @@ impl Lights {
         &mut self,
         entity: &Entity,
         world_from_light: DMat4,
-        exposure: f32,
+        sensor: Mat3,
         textures: &mut Textures,
     ) -> Result<()> {
         let scale = entity.number("scale", 1.0)?;
@@ -101,13 +107,13 @@ impl Lights {
         };
         let kind = match entity.name.as_str() {
             "infinite" => {
-                self.infinite(entity, world_from_light, scale, illuminance, exposure, textures)?;
+                self.infinite(entity, world_from_light, scale, illuminance, sensor, textures)?;
                 textures.log.unused(entity);
                 return Ok(());
             }
             "distant" => {
                 let factor = (scale * illuminance.unwrap_or(1.0)) as f32;
-                let irradiance = color(entity, "L", textures)? * factor * exposure;
+                let irradiance = exposed(sensor, color(entity, "L", textures)? * factor);
                 LampKind::Directional { direction: direction(to - from)?, irradiance }
             }
             "point" | "goniometric" => {
@@ -117,7 +123,7 @@ impl Lights {
                     _ => f64::from(mean_of_image(entity, textures)?.0.element_sum() / 3.0),
                 };
                 let factor = scale * power.map_or(mean, |power| power / (4.0 * PI));
-                let intensity = color(entity, "I", textures)? * factor as f32 * exposure;
+                let intensity = exposed(sensor, color(entity, "I", textures)? * factor as f32);
                 LampKind::Point { position: place(from), intensity }
             }
             "spot" => {
@@ -126,7 +132,7 @@ impl Lights {
                 let [inner, outer] = [inner.clamp(0.0, outer), outer].map(f64::to_radians);
                 let cone = 2.0 * PI * (1.0 - 0.5 * (inner.cos() + outer.cos()));
                 let factor = scale * power.map_or(1.0, |power| power / cone);
-                let intensity = color(entity, "I", textures)? * factor as f32 * exposure;
+                let intensity = exposed(sensor, color(entity, "I", textures)? * factor as f32);
                 spot(to - from, intensity, [inner, outer])?
             }
             "projection" => {
@@ -142,7 +148,7 @@ impl Lights {
                 let of_power =
                     |power: f64| power / (solid_angle * f64::from(luminance(mean)).max(1e-30));
                 let factor = scale * power.map_or(1.0, of_power);
-                spot(DVec3::Z, mean * factor as f32 * exposure, [outer; 2])?
+                spot(DVec3::Z, exposed(sensor, mean * factor as f32), [outer; 2])?
             }
             other => return Err(entity.error(format!("unknown light `{other}`"))),
         };
@@ -164,14 +170,14 @@ impl Lights {
         world_from_light: DMat4,
         scale: f64,
         illuminance: Option<f64>,
-        exposure: f32,
+        sensor: Mat3,
         textures: &mut Textures,
     ) -> Result<()> {
         textures.log.ignore(features::PBRT_PORTAL, entity.place_of("portal"));
         let Some(file) = entity.string("filename")? else {
             // A hemisphere of radiance 1 gives an illuminance of π.
             let factor = scale * illuminance.map_or(1.0, |illuminance| illuminance / PI);
-            self.constant += color(entity, "L", textures)? * factor as f32 * exposure;
+            self.constant += exposed(sensor, color(entity, "L", textures)? * factor as f32);
             return Ok(());
         };
         if let Some(color) = entity.find("L") {
@@ -196,7 +202,8 @@ impl Lights {
         }
         let factor = scale
             * illuminance.map_or(1.0, |wanted| wanted / upper_illuminance(&map.texels, map.width));
-        map.texels.iter_mut().for_each(|texel| *texel *= factor as f32 * exposure);
+        let texels = map.texels.iter_mut();
+        texels.for_each(|texel| *texel = exposed(sensor, *texel * factor as f32));
         self.maps.push((map, light_from_world));
         textures.log.inputs.push(path);
         Ok(())

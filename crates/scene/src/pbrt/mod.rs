@@ -78,7 +78,7 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
     let mut lights = Lights::default();
     for (entity, world_from_light) in &description.lights {
         let placed = view.mirror * *world_from_light;
-        lights.add(entity, placed, view.exposure, &mut textures)?;
+        lights.add(entity, placed, view.sensor, &mut textures)?;
     }
     let mut builder = Builder {
         view,
@@ -211,9 +211,8 @@ impl Builder<'_> {
             }
             Some(entity) => {
                 let area = area(&mesh, self.view.mirror * shape.state.ctm);
-                let exposure = self.view.exposure;
                 let textures = &mut self.materials.textures;
-                Some(lights::area_light(entity, area, exposure, textures)?)
+                Some(lights::area_light(entity, area, self.view.sensor, textures)?)
             }
             None => None,
         };
