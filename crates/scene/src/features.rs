@@ -119,7 +119,7 @@ features! {
     PBRT_ASPECT "`frameaspectratio` other than that of the film" "pixels are square";
     PBRT_CURVE "exact form of `curve`" "tubes of 3 to 6 sides";
     PBRT_DISPLACEMENT "`displacement` of shapes, or beside a `normalmap`" "left out";
-    PBRT_MISSING "files of shapes that are not there" "left out";
+    PBRT_MISSING "files of shapes and of `measured` that are not there" "left out; diffuse of 0.5";
     PBRT_FLAT "shapes whose transformation flattens space" "left out";
     PBRT_COAT_INDEX "`interface.eta` other than 1.5" "the coat reflects as one of 1.5";
     PBRT_TRANSMISSION "images of `diffusetransmission` that differ"

@@ -508,12 +508,18 @@ fn materials_are_the_nearest() {
     for (parameter, expected) in [
         ("", "expected a `filename`"),
         (r#""string filename" "../a.bsdf""#, "`../a.bsdf` leads out of that folder"),
-        (r#""string filename" "a.bsdf""#, "a.bsdf"),
     ] {
         let found = message(&format!("Material \"measured\" {parameter} {TRIANGLE}"));
         assert!(found.contains(expected), "{found}");
     }
-    assert!(message(&format!("Material \"matte\" {TRIANGLE}")).contains("--upgrade"));
+    let lost = r#"MakeNamedMaterial "a" "string type" "measured" "string filename" "a.bsdf""#;
+    let lost = world(&format!("{lost} NamedMaterial \"a\" {TRIANGLE}"));
+    assert!(matches!(lost.materials[0].kind, MaterialKind::Diffuse { .. }));
+    assert!(warnings(&lost)[0].starts_with("ignored measured `a.bsdf`, which is not there"));
+    let older = ["Material \"matte\"", "Texture \"t\" \"color\" \"imagemap\""];
+    for text in older.map(|text| format!("{text} {TRIANGLE}")) {
+        assert!(message(&text).contains("--upgrade"), "{text}");
+    }
     assert!(
         message(&format!("NamedMaterial \"x\" {TRIANGLE}"))
             .starts_with("room.pbrt:3:1: NamedMaterial")
@@ -1242,6 +1248,8 @@ fn files_of_others_mean_what_pbrt_takes_them_for() {
     let regularized = load(&format!("{integrator} {MIRRORED}"), "");
     assert_eq!(regularized.asked.depth, Some(3));
     assert!(warnings(&regularized)[0].contains("`regularize` of Integrator"));
+    let noise = load(&format!("Integrator \"volpath\" \"float rrthreshold\" 0 {MIRRORED}"), "");
+    assert_eq!(warnings(&noise), [DARK]);
     let kind = material(r#""coateddiffuse" "float eta" 1 "rgb reflectance" [.25 .25 .25]"#).kind;
     assert!(matches!(kind, MaterialKind::Diffuse { reflectance } if reflectance.x == 0.25));
     let kind = material(r#""hair" "rgb color" [.25 .25 .25]"#).kind;
@@ -1263,6 +1271,8 @@ fn files_of_others_mean_what_pbrt_takes_them_for() {
     let [still, moved] =
         ["Translate 1 1 0", motion].map(|text| positions(&world(&format!("{text} {TRIANGLE}"))));
     assert_eq!(still, moved);
+    let camera = format!("{MIRRORED} ActiveTransform EndTime Translate 1 0 0");
+    assert_eq!(positions(&load(&camera, &format!("Translate 1 1 0 {TRIANGLE}"))), still);
     let light = format!(r#"AreaLightSource "diffuse" {TRIANGLE} "float alpha" 0"#);
     let scene = world(&light);
     let surface = &scene.materials[0].surface;
@@ -1528,7 +1538,8 @@ fn everything_left_out_is_named_once() {
         Material "coateddiffuse" "float uroughness" 0.1 "float vroughness" 0.2 "rgb albedo" [1 0 0]
         Scale 1 0 1 {TRIANGLE}
         Material "hair" {TRIANGLE}
-        Identity Texture "m" "spectrum" "marble" Texture "d" "spectrum" "directionmix"
+        Identity Texture "m" "spectrum" "marble" "integer octaves" 4
+        Texture "d" "spectrum" "directionmix" "vector3 dir" [0 1 0]
         Material "diffuse" "texture reflectance" "m" {TRIANGLE} "vector S" [1 0 0 1 0 0 1 0 0]
         Material "diffuse" "texture reflectance" "d" {TRIANGLE}
         ObjectBegin "lit" AreaLightSource "diffuse" {TRIANGLE} ObjectEnd ObjectInstance "lit""#
@@ -1550,11 +1561,11 @@ fn everything_left_out_is_named_once() {
         "ignored `uroughness` other than `vroughness`, of plastic and glass or textures (line 13): their \
          mean α, or the texture",
         "ignored shapes whose transformation flattens space (2, first in line 14): left out",
-        "ignored parameters of `hair` (line 15): rendered as diffuse of its `reflectance`, or 0.5",
-        "ignored marble (line 16)",
-        "ignored directionmix (line 16)",
-        "ignored tangents `S` of meshes (line 17)",
-        "ignored area lights in objects (line 19): dark, as in pbrt",
+        "ignored parameters of `hair` (line 15): diffuse of its colour",
+        "ignored texture `marble`: 0.5 instead (line 16)",
+        "ignored texture `directionmix`: its mean instead (line 17)",
+        "ignored tangents `S` of meshes (line 18)",
+        "ignored area lights in objects (line 20): dark, as in pbrt",
         DARK,
     ];
     let found = warnings(&scene);

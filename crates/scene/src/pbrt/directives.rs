@@ -141,7 +141,7 @@ impl<'a> Reader<'a> {
                 if std::mem::replace(&mut self.in_world, true) {
                     return Err(place.error("a second WorldBegin"));
                 }
-                self.states.now.ctm = DMat4::IDENTITY;
+                (self.states.now.ctm, self.states.now.at_end) = (DMat4::IDENTITY, false);
                 self.states.named.insert("world".to_owned(), DMat4::IDENTITY);
                 Ok(())
             }
@@ -410,7 +410,10 @@ impl<'a> Reader<'a> {
         let kind = self.text("Texture")?;
         let entity = Entity::read(&mut self.source, "Texture", kind, place, inherited)?;
         if !["float", "spectrum"].contains(&values.as_str()) {
-            let message = format!("`{name}`: expected values of float or spectrum, found {values}");
+            let message = format!(
+                "`{name}`: expected values of float or spectrum, found {values}; files of pbrt-v3 are \
+                 converted by `pbrt --upgrade`"
+            );
             return Err(entity.error(message));
         }
         let error = entity.error(format!("the name `{name}` is taken by another texture"));

@@ -155,6 +155,11 @@ impl<'a> Materials<'a> {
         let name = entity.required("filename")?;
         let log = &mut self.textures.log;
         let path = log.folder.file(name).map_err(|message| entity.error(message))?;
+        if !path.exists() {
+            let name = format!("measured `{name}`, which is not there: diffuse of 0.5");
+            log.ignore_named(features::PBRT_MISSING, &name, &entity.place);
+            return Ok(MaterialKind::Diffuse { reflectance: Vec3::splat(0.5) });
+        }
         let table = self.measured.table(&path, &mut log.inputs, &mut log.warnings)?;
         surface.anisotropy.strength = f32::from(table.has_turns());
         Ok(MaterialKind::Measured { path, table })

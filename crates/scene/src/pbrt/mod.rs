@@ -164,7 +164,7 @@ fn asked(description: &Description, log: &mut Log) -> Asked {
     for entity in [&description.sampler, &description.integrator].into_iter().flatten() {
         entity.without_effect(
             "seed randomization jitter lightsampler mutationsperpixel bootstrapsamples chains sigma \
-             largestepprobability photonsperiteration iterations radius",
+             largestepprobability photonsperiteration iterations radius rrthreshold",
         );
         log.unused(entity);
     }

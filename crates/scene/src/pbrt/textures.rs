@@ -118,7 +118,7 @@ impl<'a> Textures<'a> {
                 let (first, second) = (of(self, "tex1", 0.0)?, of(self, "tex2", 1.0)?);
                 let amount = self.value(entity, "amount", true)?.unwrap_or(Value::number(0.5));
                 if entity.name == "directionmix" {
-                    self.log.ignore_named(features::PBRT_TEXTURE, "directionmix", &entity.place);
+                    self.ignore(entity, "its mean");
                 }
                 Ok(match (first, second, amount) {
                     (Value::Constant(constant), image, Value::Constant(amount)) => {
@@ -143,17 +143,24 @@ impl<'a> Textures<'a> {
                         Ok(Value::Image(checkerboard(first, second, mapping)))
                     }
                     (first, _) => {
-                        self.log.ignore_named(features::PBRT_TEXTURE, &entity.name, &entity.place);
+                        self.ignore(entity, "its `tex1`");
                         Ok(first)
                     }
                 }
             }
             "bilerp" | "dots" | "fbm" | "marble" | "windy" | "wrinkled" | "ptex" => {
-                self.log.ignore_named(features::PBRT_TEXTURE, &entity.name, &entity.place);
+                self.ignore(entity, "0.5");
                 Ok(Value::number(0.5))
             }
             _ => Err(entity.error("expected a kind of texture that pbrt-v4 has")),
         }
+    }
+
+    /// Names a kind of texture, with all its parameters, as rendered by another value.
+    fn ignore(&mut self, entity: &Entity, value: &str) {
+        let name = format!("texture `{}`: {value} instead", entity.name);
+        self.log.ignore_named(features::PBRT_TEXTURE, &name, &entity.place);
+        entity.unused().for_each(drop);
     }
 
     /// Makes a value of others texel by texel.
@@ -291,6 +298,7 @@ fn mapping(entity: &Entity, log: &mut Log) -> Result<Mapping> {
     if kind != "uv" {
         let name = format!("mapping `{kind}` of a texture");
         log.ignore_named(features::PBRT_TEXTURE_MAPPING, &name, &entity.place);
+        entity.without_effect("v1 v2");
     }
     let of = |name: &str, otherwise: f64| Ok(entity.number(name, otherwise)? as f32);
     Ok(([of("udelta", 0.0)?, of("uscale", 1.0)?], [of("vdelta", 0.0)?, of("vscale", 1.0)?]))
