@@ -161,7 +161,8 @@ fn other_cameras_look_from_their_place() {
         let scene = load(&format!("{film} LookAt 0 0 -5 0 0 0 0 1 0 Camera {kind}"), TRIANGLE);
         let found = warnings(&scene);
         let expected = kind.split('"').nth(1).unwrap();
-        let named = format!("ignored Camera `{expected}`, seen as `perspective` (line 1)");
+        let way = if expected == "orthographic" { "from afar" } else { "of 90°" };
+        let named = format!("ignored Camera `{expected}`: `perspective` {way} instead (line 1)");
         assert_eq!(found, [named.as_str(), DARK]);
         scene.camera
     };

@@ -35,7 +35,8 @@ pub(super) fn view(description: &Description, log: &mut Log) -> Result<View> {
     match entity.name.as_str() {
         "perspective" => {}
         "orthographic" | "spherical" | "realistic" => {
-            let name = format!("Camera `{}`, seen as `perspective`", entity.name);
+            let way = if entity.name == "orthographic" { "from afar" } else { "of 90°" };
+            let name = format!("Camera `{}`: `perspective` {way} instead", entity.name);
             log.ignore_named(features::PBRT_CAMERA, &name, &entity.place);
             entity.without_effect("mapping lensfile aperturediameter aperture focusdistance");
         }
