@@ -19,8 +19,9 @@ ROOM = SCENES / "meeting_room.toml"
 QUICK = {"size": (16, 12), "depth": 1, "sampler": "mis"}
 
 
-def floor(triangles=((0, 1, 2), (0, 2, 3)), **environment):
+def floor(triangles=((0, 1, 2), (0, 2, 3)), reflectance=(0.5, 0.5, np.float32(0.25)), uvs=None, **light):
     """A floor of reflectance one half, seen from above."""
+    mesh = {"positions": [[-9, 0, -9], [-9, 0, 9], [9, 0, 9], [9, 0, -9]], "triangles": triangles}
     return fenestra.Scene.build({
         "camera": {
             "position": np.array([0, 2, 0]),
@@ -29,12 +30,9 @@ def floor(triangles=((0, 1, 2), (0, 2, 3)), **environment):
             "vertical_fov_deg": 40,
         },
         "film": {"width": 8, "height": 6},
-        "environment": environment,
-        "material": [{"name": "grey", "type": "diffuse", "reflectance": [0.5, 0.5, np.float32(0.25)]}],
-        "object": [{
-            "mesh": {"positions": [[-9, 0, -9], [-9, 0, 9], [9, 0, 9], [9, 0, -9]], "triangles": triangles},
-            "material": "grey",
-        }],
+        "environment": light,
+        "material": [{"name": "grey", "type": "diffuse", "reflectance": reflectance}],
+        "object": [{"mesh": mesh if uvs is None else {**mesh, "uvs": uvs}, "material": "grey"}],
     })
 
 
@@ -68,6 +66,17 @@ class Package(unittest.TestCase):
         for environment in maps:
             mean = floor(**environment).render(depth=1, sampler="mis", spp=64).rgb.mean(axis=(0, 1))
             np.testing.assert_allclose(mean, [0.5, 0.5, 0.25], rtol=0.02)
+        # An image of four columns, of which all corners lie between the first two.
+        columns = np.repeat([[[0.8], [0.8], [0.2], [0.2]]], 3, axis=2)
+        scene = floor(reflectance={"texture": columns}, uvs=[[0.25, 0.5]] * 4, constant=[1, 1, 1])
+        small = scene.render(depth=1, sampler="mis", spp=64, size=(4, 3), aov=["P"])
+        np.testing.assert_allclose(small.rgb.mean(), 0.8, rtol=0.02)
+        # The floor lies across the view, two metres away, at the edges too.
+        np.testing.assert_allclose(small.layers["depth"], 2, rtol=1e-4)
+        half = floor(((0, 1, 2),), constant=[1, 1, 1]).render(depth=1, sampler="mis", spp=1, aov=["P"])
+        self.assertEqual(set(half.layers["depth"].round(4).flat), {2, np.inf})
+        # A size is that of one render.
+        self.assertEqual(scene.size, (8, 6))
 
     def test_an_interrupt_keeps_the_picture(self):
         # Shells start what runs in the background deaf to interrupts.

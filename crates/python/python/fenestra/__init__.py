@@ -147,7 +147,8 @@ class Picture:
 
     #: Linear Rec.709, (height, width, 3), 32-bit floats.
     rgb: np.ndarray
-    #: Further layers by name, (height, width) or (height, width, components); "depth" beside "P", metres.
+    #: Further layers by name, (height, width) or (height, width, components); "depth" beside "P", metres,
+    #: infinite where no sample met a surface.
     layers: dict[str, np.ndarray]
     #: Rule that ended the render: "spp", "time", "error", "last-sample" or "interrupt".
     reason: str
@@ -169,7 +170,9 @@ class Picture:
         self.rgb = self.layers.pop("")
         if "P" in self.layers:
             position, direction = (np.asarray(vector, "f4") for vector in view)
-            self.layers["depth"] = (self.layers["P"] - position) @ direction
+            depth = (self.layers["P"] - position) @ direction
+            depth[~self.layers["P"].any(-1)] = np.inf
+            self.layers["depth"] = depth
 
     @property
     def spp(self) -> int:
