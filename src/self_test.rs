@@ -341,7 +341,8 @@ mod tests {
             fault(|found| found.hits.iter_mut().flatten().for_each(|hit| hit.instance = 0));
         assert!(instance.starts_with("closest hits: "), "{instance}");
         let no_shadow = fault(|found| found.visibility.fill(1));
-        assert!(no_shadow.starts_with("shadow rays: "), "{no_shadow}");
+        let told = format!(" of {RAYS} are wrong, {RAYS} reach the light where ");
+        assert!(no_shadow.starts_with("shadow rays: ") && no_shadow.contains(&told), "{no_shadow}");
         // One wrong answer in a hundred is no rounding.
         let few = fault(|found| found.visibility.iter_mut().step_by(100).for_each(|one| *one ^= 1));
         assert!(few.starts_with("shadow rays: 41 "), "{few}");

@@ -89,6 +89,15 @@ fn the_arm_is_measured_and_told() {
         let chosen = found.iter().filter(|cost| cost.at_samples == at_samples && cost.is_chosen);
         assert_eq!(chosen.count(), 1);
     }
+    let chosen = |at_samples: u32| {
+        let mut those = found.iter().filter(|cost| cost.at_samples == at_samples);
+        those.find(|cost| cost.is_chosen).unwrap()
+    };
+    // The sentence compares the last race's choice with the best of the others.
+    let others = found.iter().filter(|cost| cost.at_samples == 128 && !cost.is_chosen);
+    let second = others.map(|cost| cost.relative_cost).reduce(f64::min).unwrap();
+    let told = format!("with {:.2} times", second / chosen(128).relative_cost);
+    assert!(auto.report().choice.unwrap().contains(&told), "{told}: {:?}", auto.report().choice);
     assert!(auto.host_ms()["choice of an arm"] > 0.0);
     // Measured rays teach nothing: the guide has learned of the last sample since, at two vertices.
     let taught: u32 = state.pending_arrivals.iter().map(|[rays, _]| rays).sum();
@@ -97,6 +106,30 @@ fn the_arm_is_measured_and_told() {
     let mut again = renderer(&room(), guided(None));
     again.render_pass(129).unwrap();
     assert_same(&auto.sums().unwrap(), &again.sums().unwrap());
+    support::assert_silent();
+}
+
+/// The third race decides the number of rays, in a film of this size at 256 samples per pixel.
+#[test]
+fn no_arm_has_more_rays_than_asked_for() {
+    let _alone = support::alone();
+    let mut later = renderer(&room(), guided(None));
+    let sums = Sums { sample_count: 256, ..later.sums().unwrap() };
+    let empty = later.guide_state().unwrap().unwrap();
+    let arm = Some(Arm { is_guided: true, guides_later: true, rays: [8, 8], ..LEAN });
+    later.restore(&sums).unwrap();
+    later.restore_guide(&GuideState { samples: 256, arm, races: 2, ..empty }).unwrap();
+    later.render_pass(1).unwrap();
+    let found = costs(&later.report().figures);
+    let names: Vec<&str> = found.iter().map(|cost| cost.arm.as_str()).collect();
+    let [all, half] = ["guided, 8 + 8 rays", "guided, 4 + 4 rays"];
+    assert!(
+        names.len() == 2 && names[0].starts_with(all) && names[1].starts_with(half),
+        "{names:?}"
+    );
+    // A new arm has random numbers of its own from here on.
+    let since = later.guide_state().unwrap().unwrap().arm_since;
+    assert_eq!(since, if found[1].is_chosen { 256 } else { 0 });
     support::assert_silent();
 }
 

@@ -251,8 +251,21 @@ fn an_edge_has_the_blur_of_filter_and_lens() {
             assert!((variance - of_coin).abs() < 0.02, "{name}: {variance}, not {of_coin}");
         }
     }
-    // The border across the film, in the middle of its lowest row.
-    (scene.camera.up, scene.camera.shift) = (Vec3::X, [0.0, 3.0 / 7.0]);
+    // A lens is round: the border across the film has the same blur.
+    (scene.camera.up, scene.camera.shift) = (Vec3::X, [0.0; 2]);
+    (scene.camera.aperture_radius, scene.camera.focus_distance) = (1.5, 3.0);
+    scene.film.filter = Filter::Box;
+    let sums = render(&scene, Settings { shadow_rays: 0, ..Settings::default() }, 512);
+    for row in 0..7 {
+        let at =
+            |step: u32| 3.0 - f64::from(row) + (f64::from(step) + 0.5) / f64::from(STEPS) - 0.5;
+        let expected = (0..STEPS).map(|step| disk(2.0 * pixel * at(step))).sum::<f64>();
+        let columns = (0..21).map(|column| sums.mean((row * 21 + column) as usize)[0]);
+        let difference = columns.sum::<f64>() / 21.0 - expected / f64::from(STEPS);
+        assert!(difference.abs() < 0.03, "row {row}: {difference}");
+    }
+    // In the middle of its lowest row.
+    (scene.camera.aperture_radius, scene.camera.shift) = (0.0, [0.0, 3.0 / 7.0]);
     let sums = render(&scene, Settings { shadow_rays: 0, ..Settings::default() }, 64);
     let dark = (0..sums.pixel_count()).filter(|pixel| sums.mean(*pixel)[0] < 0.75);
     assert_eq!(dark.collect::<Vec<_>>(), (6 * 21..7 * 21).collect::<Vec<_>>());

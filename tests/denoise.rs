@@ -156,6 +156,26 @@ fn bad_pixels_and_missing_layers_are_named() {
 }
 
 #[test]
+fn layers_reach_the_denoiser_as_they_are_but_finite() {
+    let folder = Folder::new();
+    let library = stub(&folder, false);
+    let mut film = noisy(&folder, "in.exr", true);
+    film.channels.get_mut("Albedo.R").unwrap()[7] = f32::INFINITY;
+    film.channels.get_mut("N.Z").unwrap()[30] = f32::NAN;
+    film.write_exr(&folder.path().join("in.exr")).unwrap();
+    for (layer, expected) in [("albedo", [0.5; 3]), ("normal", [0.0, 0.0, 1.0])] {
+        let mut program = program(folder.path());
+        program.args(["convert", "in.exr", "out.exr", "--denoise"]).env("STUB_SHOWS", layer);
+        Run::of(&program.env(VARIABLE, &library).output().unwrap()).assert(0, &[]);
+        let shown = folder.image("out.exr");
+        for (channel, expected) in ["R", "G", "B"].into_iter().zip(expected) {
+            let is_near = |value: &f32| (value - expected).abs() < 1e-6;
+            assert!(shown.channels[channel].iter().all(is_near), "{layer} {channel}");
+        }
+    }
+}
+
+#[test]
 fn a_denoised_picture_is_no_film() {
     let folder = Folder::new();
     let library = stub(&folder, false);
@@ -267,6 +287,11 @@ fn a_render_keeps_its_film() {
     let [shown, clean] = ["film.png", "film.denoised.png"].map(|name| folder.path().join(name));
     let [shown, clean] = [shown, clean].map(|path| fs::read(path).unwrap());
     assert_ne!(shown, clean);
+    // Noise that pixels have in common would stay: none shares a path unless asked to.
+    let guided = ["render", "scene.toml", "--spp=1", "--depth=2", "-o=guided.exr", "--denoise"];
+    run(&folder, &library, &guided).assert(0, &[]);
+    let sharing = &folder.image("guided.exr").attributes["fenestra.sampler_parameters.share-paths"];
+    assert_eq!(*sharing, Attribute::Text("off".into()));
     // Both previews have the exposure asked for.
     for (picture, preview) in [("film.exr", shown), ("film.denoised.exr", clean)] {
         let options = ["convert", picture, "again.png", "--exposure=-2"];

@@ -257,6 +257,9 @@ fn a_run_by_time_ends_with_the_nearest_sample() {
         };
         assert_eq!([met(0.6), met(0.4), met(0.0)], [None, reason, Some(StopReason::Time)]);
     }
+    // Each frame of an animation has its own time.
+    session.next_frame(&scene(), 8).unwrap();
+    assert_eq!(session.seconds(), 0.0);
 }
 
 /// Samples of a seed have numbers of 32 bits.

@@ -3,7 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
 use std::{
-    env,
+    env, fs,
+    os::unix::fs::PermissionsExt,
     process::{Child, Command},
     thread,
     time::Duration,
@@ -11,7 +12,7 @@ use std::{
 
 use fenestra::film::Image;
 
-use crate::support::command::{self, Folder, program};
+use crate::support::command::{self, Folder, Run, program};
 
 const SPP: &str = "400";
 const OPTIONS: &str = "--sampler=mis --depth=2 --checkpoint-interval=1ms";
@@ -26,6 +27,19 @@ fn task(folder: &Folder, number: u32) -> Child {
         .envs([("WIDTH", "24"), ("HEIGHT", "15"), ("BANDS", "2"), ("OPTIONS", OPTIONS)])
         .env("SLURM_ARRAY_TASK_ID", number.to_string());
     task.spawn().unwrap()
+}
+
+/// As many tasks as there are bands of all seeds, counted from 0.
+#[test]
+fn a_farm_is_submitted_as_one_array() {
+    let folder = Folder::new();
+    let sbatch = folder.write("sbatch", "#!/bin/sh\necho \"$@\"\n");
+    fs::set_permissions(sbatch, fs::Permissions::from_mode(0o755)).unwrap();
+    let mut script = Command::new(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/farm/submit.sh"));
+    script.envs([("SEEDS", "3"), ("BANDS", "4")]);
+    let path = format!("{}:{}", folder.path().display(), env::var("PATH").unwrap());
+    Run::of(&script.env("PATH", path).output().unwrap())
+        .assert_output(&["--array=0-11 ", "farm/task.sh\n"]);
 }
 
 #[test]

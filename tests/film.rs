@@ -239,15 +239,15 @@ fn mean_and_variance_agree_with_64_bit_sums() {
 
 #[test]
 fn relative_error_of_a_picture_worked_by_hand() {
-    // Two pixels have two samples each: 0 and 2 in every channel, and 3 and 3. With means 1 and 3,
-    // variances of the mean 1 and 0, and image mean 2, expect the average of 1/√(1 + 0.04) and 0.
+    // Two pixels have two samples each: 0 and 2, but for 1 and 1 in red, and 3 and 3. With means 1 and 3,
+    // mean standard errors ⅔ and 0, and image mean 2, expect the average of ⅔/√(1 + 0.04) and 0.
     let mut sums = Sums::new([0, 0], 2, 1, [2, 1]);
     assert_eq!(sums.relative_standard_error(), f64::INFINITY);
     sums.sum = vec![[2.0; 3], [6.0; 3]];
-    sums.squares = vec![[4.0; 3], [18.0; 3]];
+    sums.squares = vec![[2.0, 4.0, 4.0], [18.0; 3]];
     sums.sample_count = 2;
-    assert_eq!(sums.variance_of_mean(0), [1.0; 3]);
-    let expected = 0.5 / 1.04_f64.sqrt();
+    assert_eq!(sums.variance_of_mean(0), [0.0, 1.0, 1.0]);
+    let expected = 0.5 * (2.0 / 3.0) / 1.04_f64.sqrt();
     assert!((sums.relative_standard_error() - expected).abs() < 1e-15);
     let mut black = Sums::new([0, 0], 2, 1, [2, 1]);
     black.sample_count = 2;

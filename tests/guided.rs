@@ -380,6 +380,9 @@ fn every_epoch_has_its_own_random_numbers() {
         renderer.restore_guide(state).unwrap();
         renderer.guide_state().unwrap().unwrap().tag
     };
+    let mut other = learned.clone();
+    other.counts[0][0] += 1;
+    assert_ne!(other.epoch_tag(), learned.epoch_tag(), "guides that learned other things");
     let loaded = tag(0, &learned);
     assert_eq!(loaded, learned.epoch_tag());
     assert_eq!(tag(2, &GuideState { tag: loaded, ..learned }), loaded, "resumed");

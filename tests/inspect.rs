@@ -64,6 +64,15 @@ fn images_are_merged_by_their_sample_counts() {
     assert_eq!(json(&run.output)["sample_ranges"].as_array().unwrap().len(), 3);
     let merged = folder.image("all.exr");
     assert_eq!(merged.channels["G"], [1.0; 8]);
+    // Bands of one size lie where they are.
+    for (name, value) in [("upper", 1.0), ("lower", 2.0)] {
+        let mut band = checkpoint(1, 4, value);
+        band.sums.origin = [0, if name == "lower" { 2 } else { 0 }];
+        band.sums.film_size = [4, 4];
+        write(&folder, name, &band);
+    }
+    folder.run(&["merge", "upper.exr", "lower.exr", "-o", "bands.exr"]).assert(0, &[]);
+    assert_eq!(folder.image("bands.exr").channels["B"], [[1.0; 8], [2.0; 8]].concat());
 }
 
 #[test]
@@ -96,6 +105,9 @@ fn parts_that_share_samples_or_show_something_else_are_refused() {
     write(&folder, "again", &checkpoint(1, 4, 1.0));
     let run = folder.run(&["merge", "a.exr", "again.exr", "-o", "out.exr"]);
     run.assert(1, &["again.exr: holds samples 0..4 of seed 1, but a.exr holds", "--seed"]);
+    // Every two parts are compared, not each with the first alone.
+    let run = folder.run(&["merge", "b.exr", "a.exr", "again.exr", "-o", "out.exr"]);
+    run.assert(1, &["again.exr: holds samples 0..4 of seed 1, but a.exr holds"]);
     let mut other = checkpoint(7, 4, 1.0);
     other.metadata.scene_hash = "cd34".to_owned();
     other.metadata.sampler = "env".to_owned();

@@ -170,7 +170,8 @@ fn a_study_has_every_figure() {
     assert_eq!(reference["spp"], 128);
     assert!(reference["mse"].as_f64().unwrap() > 0.0);
     let check = &results["scenes"][0]["reference_check"];
-    assert!(check["description"].as_str().unwrap().starts_with("env, two halves of "), "{check}");
+    let half_spp = check["spp"].as_u64().unwrap() / 2;
+    assert_eq!(check["description"], format!("env, two halves of {half_spp} spp,"));
     assert_ne!(check["verdict"], "disagrees", "{check}");
     assert!(check["spp"].as_u64().unwrap() >= 2 && check["seconds"].as_f64().unwrap() > 0.0);
     let seeds = [1, 2].map(|half| {
@@ -269,6 +270,20 @@ fn the_same_seed_has_the_same_error() {
             run["measurements"].as_array().unwrap().iter().map(|m| m["mse"].clone()).collect()
         };
         assert_eq!(errors(a), errors(b));
+    }
+    // In its standard errors a mean is as far off, however bright the light is.
+    let bright = yard("[0.6, 0.4, 0.3]").replace("[environment]", "[environment]\nscale = 4.0");
+    folder.write("yard.toml", bright);
+    fs::remove_dir_all(folder.path().join("report")).unwrap();
+    folder.run(&small()).assert(0, &[]);
+    let bright = json(&folder, "results.json");
+    let deviations = |results: &Value| -> Vec<f64> {
+        let runs = results["runs"].as_array().unwrap().iter();
+        let last = runs.map(|run| run["measurements"].as_array().unwrap().last().unwrap());
+        last.map(|last| last["mean_deviation"].as_f64().unwrap()).collect()
+    };
+    for (one, other) in deviations(&first).into_iter().zip(deviations(&bright)) {
+        assert!((one - other).abs() < 1e-3 * one.abs(), "{one} {other}");
     }
 }
 
@@ -645,6 +660,8 @@ fn references_that_do_not_fit_are_refused() {
     };
     reference(&folder, "wide.exr", &["--size=32x16"]);
     refuse(&["--reference=wide.exr"], &["wide.exr shows 32x16", "24x16", "--size 32x16"]);
+    reference(&folder, "part.exr", &["--size=48x32", "--crop=5,3,29,19"]);
+    refuse(&["--reference=part.exr"], &["part.exr shows 24x16 pixels at 5,3"]);
     reference(&folder, "a.exr", &[]);
     let twice = ["--reference=a.exr", "--reference=a.exr"];
     refuse(&twice, &["share samples (0:0+64)", "different seeds"]);

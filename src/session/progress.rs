@@ -34,7 +34,8 @@ impl Session {
         if samples > 0 && self.seconds_left(rules) <= self.half_sample() {
             return Some(StopReason::Time);
         }
-        let reached = |limit: f64| samples > 1 && self.relative_error.is_some_and(|e| e <= limit);
+        // Below two samples it is infinite.
+        let reached = |limit: f64| self.relative_error.is_some_and(|error| error <= limit);
         rules.error.is_some_and(reached).then_some(StopReason::Error)
     }
 

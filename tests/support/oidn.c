@@ -1,6 +1,6 @@
 /* Stands in for Open Image Denoise in tests/denoise.rs: its C API, with a box filter of 7 by 7 pixels.
  * OLD gives two functions the names that version 1 has. STUB_FAILS makes the filter fail; STUB_WANTS_LAYERS
- * makes it fail without albedo and normal. */
+ * makes it fail without albedo and normal; STUB_SHOWS has it filter one of these instead of the picture. */
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -66,14 +66,18 @@ void oidnExecuteFilter(struct filter *filter) {
     if (getenv("STUB_FAILS")) error = "out of luck";
     if (getenv("STUB_WANTS_LAYERS") && (!filter->albedo || !filter->normal)) error = "no layers";
     if (error) return;
+    const char *shown = getenv("STUB_SHOWS");
+    const float *picture = shown && !strcmp(shown, "normal") ? filter->normal
+                           : shown                           ? filter->albedo
+                                                             : filter->color;
     for (long at = 0; at < width * height * 3; at++) {
         long y = at / 3 / width, x = at / 3 % width, count = 0;
         float sum = 0;
-        if (!isfinite(filter->color[at])) error = "a value that is not finite";
+        if (!isfinite(picture[at])) error = "a value that is not finite";
         for (long v = y - 3; v <= y + 3; v++) {
             for (long u = x - 3; u <= x + 3; u++) {
                 if (u < 0 || v < 0 || u >= width || v >= height) continue;
-                sum += filter->color[(v * width + u) * 3 + at % 3];
+                sum += picture[(v * width + u) * 3 + at % 3];
                 count++;
             }
         }

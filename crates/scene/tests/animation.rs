@@ -41,6 +41,9 @@ fn the_camera_follows_its_key_frames() {
     let first = at("room.toml", &leaning, Some(1.0)).unwrap().camera;
     assert_eq!((first.up, first.vertical_fov_deg), (Vec3::new(1.0, 1.0, 0.0), 50.0));
 
+    let widening = ROOM.replace("focus_distance = 2", "focus_distance = 2, aperture_radius = 0.5");
+    assert_eq!(at("room.toml", &widening, Some(2.0)).unwrap().camera.aperture_radius, 0.25);
+
     let [one, other] = [1.0, 2.0].map(|time| at("room.toml", ROOM, Some(time)).unwrap());
     assert_ne!(one.hash, other.hash);
     assert_eq!(still_hash(&one), still_hash(&other), "the camera alone moves");
