@@ -23,7 +23,7 @@ use fenestra::{
 
 use crate::support::{
     self,
-    command::{self, BALL, Folder, yard},
+    command::{self, BALL, Folder, words, yard},
     faulty_layer, page,
     x11::{Server, View},
 };
@@ -125,6 +125,10 @@ fn the_window_shows_what_render_writes() {
         let grey = [33; 3];
         picture[0] == grey && picture[16] != grey && picture[143] != grey && picture[144] == grey
     });
+    // One vertex is the least.
+    view.tap("[");
+    view.tap("[");
+    view.wait_for("depth 1");
     view.tap("Escape");
     let run = view.end();
     run.assert(0, &["wrote yard.view-1.png, yard.view-1.exr, yard.view-1.toml"]);
@@ -200,11 +204,17 @@ fn samplers_layers_and_insets_can_be_looked_at() {
     view.resize([640, 480]);
     let corner = 479 * 640 + 639;
     view.wait_until(|view| view.picture([640, 480]).get(corner).is_some());
+    // The line lies in the middle of the films, beside the panel of 250 columns.
+    view.wait_until(|view| view.picture([640, 480])[240 * 640 + 250 + 195] == [255; 3]);
     let before = view.picture([640, 480]);
     view.point([320, 380]);
     view.tap("i");
     let line = (480 - 130) * 640 + 500;
     view.wait_until(|view| view.picture([640, 480])[line..line + 9] != before[line..line + 9]);
+    // Without the other side, keys choose the sampler of the only one.
+    view.tap("x");
+    view.tap("4");
+    view.wait_until(|view| view.title().starts_with("room | env"));
     view.tap("Escape");
     view.end().assert(0, &[]);
 }
@@ -237,9 +247,13 @@ fn bookmark(view: &mut View<'_>, folder: &Folder, is_wanted: impl Fn(&str) -> bo
 fn controls_change_what_they_say() {
     let folder = folder();
     let server = Server::start();
-    let options = ["--sampler", "mis", "--depth", "2", "--spp", "8", "--validate"];
+    let options = words("--sampler=mis --depth=2 --spp=8 --validate --exposure=0.25");
     let mut view = View::open(&server, &folder, "yard.toml", &options, SIZE);
     view.wait_at_rest("mis 8 spp");
+    // The display may show the picture a little after the title.
+    let moment = std::time::Duration::from_millis(300);
+    std::thread::sleep(moment);
+    let colour = view.picture(SIZE)[24 * 64 + 32];
     view.resize(WIDE);
     let at = |view: &View<'_>, [x, y]: [usize; 2]| view.picture(WIDE).get(660 * y + x).copied();
     // Columns right of the panel, where the film is.
@@ -249,10 +263,25 @@ fn controls_change_what_they_say() {
     };
     view.wait_until(|view| at(view, [100, 470]) == Some(PANEL));
     view.wait_until(|view| at(view, [455, 20]) == Some(AROUND));
+    // The panel leaves the exposure as it is, on the same pixel of the film.
+    std::thread::sleep(moment);
+    assert_eq!(at(&view, [458, 242]), Some(colour));
 
     let before = film(&view);
     view.click([98, 63]);
-    view.wait_until(|view| !view.title().contains("+0.0 stops") && film(view) != before);
+    view.wait_until(|view| !view.title().contains("+0.2 stops") && film(view) != before);
+    // Exposure by the picture does not add to the one before.
+    let stops = |view: &View<'_>| {
+        let title = view.title();
+        title.split(' ').nth_back(1).unwrap().parse::<f32>().unwrap()
+    };
+    let set = stops(&view);
+    view.tap("0");
+    view.wait_until(|view| stops(view) != set);
+    let expected = format!("{:+.1} stops", stops(&view) + 0.5);
+    view.tap("0");
+    view.tap("=");
+    view.wait_for(&expected);
     view.click([84, 83]);
     let below = |view: &View<'_>| view.picture(WIDE)[660 * 35..660 * 60].to_vec();
     let closed = below(&view);
@@ -265,6 +294,11 @@ fn controls_change_what_they_say() {
     view.wait_until(|view| film(view) != noisy);
 
     let first = bookmark(&mut view, &folder, |_| true);
+    // The file has the columns beside the panel.
+    view.tap("p");
+    view.wait_for_file("yard.view-2.toml");
+    let written = image::open(folder.path().join("yard.view-2.png")).unwrap();
+    assert_eq!((written.width(), written.height()), (WIDE[0] - 250, WIDE[1]));
     view.click([110, 151]);
     bookmark(&mut view, &folder, |camera| camera != first);
     view.click([60, 171]);
@@ -288,11 +322,32 @@ fn controls_change_what_they_say() {
     assert!((0.5..9.0).contains(&distance(&focused).unwrap()), "{focused}");
 
     // A drag over the panel moves no camera, and a view that was written is returned to.
-    view.drag([100, 460], [200, 440]);
+    view.drag(1, [100, 460], [200, 440]);
     assert_eq!(bookmark(&mut view, &folder, |_| true), focused);
     view.click([188, 219]);
     bookmark(&mut view, &folder, |camera| camera == first);
     view.wait_at_rest(" 8 spp");
+
+    let vector = |camera: &str, key: &str| {
+        let table = camera.parse::<toml::Table>().unwrap();
+        glam::Vec3::from(
+            [0, 1, 2].map(|axis| table["camera"][key][axis].as_float().unwrap() as f32),
+        )
+    };
+    let way = |camera: &str| vector(camera, "look_at") - vector(camera, "position");
+    // Closer by the wheel, up by the right button, and to the left where the middle one drags to the right.
+    // The controls have to see first that the pointer has left them.
+    view.point([455, 300]);
+    std::thread::sleep(moment);
+    view.drag(4, [455, 300], [455, 300]);
+    let far = way(&first).length();
+    bookmark(&mut view, &folder, |camera| way(camera).length() < 0.9 * far);
+    let rise =
+        |camera: &str| way(camera).y.atan2(-way(camera).z) - way(&first).y.atan2(-way(&first).z);
+    view.drag(3, [455, 300], [455, 280]);
+    bookmark(&mut view, &folder, |camera| (rise(camera) - 3.0 * 20.0 / 480.0).abs() < 1e-3);
+    view.drag(2, [455, 300], [475, 300]);
+    bookmark(&mut view, &folder, |camera| vector(camera, "position").x < -0.05);
 
     let ask = |view: &View<'_>| {
         view.press("Shift");

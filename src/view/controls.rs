@@ -208,7 +208,7 @@ fn panel_of(ui: &mut Ui, status: &mut Status, inputs: &mut Vec<Input>) {
     ui.separator();
     ui.horizontal(|ui| {
         let exposure = Slider::new(&mut status.tone.exposure, -8.0..=8.0).step_by(0.1).text("EV");
-        if ui.add(exposure).changed() {
+        if ui.add(exposure.clamping(SliderClamping::Edits)).changed() {
             set(Setting::Exposure(status.tone.exposure));
         }
         if ui.small_button("auto").clicked() {

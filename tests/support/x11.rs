@@ -225,17 +225,18 @@ impl<'a> View<'a> {
         moved.unwrap().check().unwrap();
     }
 
-    /// Presses the first button of the pointer at a pixel of the window, and releases it at another.
-    pub fn drag(&self, from: [i16; 2], to: [i16; 2]) {
+    /// Presses a button of the pointer at a pixel of the window, and releases it at another: left, middle and
+    /// right are 1 to 3, a notch of the wheel away from the user is 4.
+    pub fn drag(&self, button: u8, from: [i16; 2], to: [i16; 2]) {
         self.point(from);
-        self.send(BUTTON_PRESS_EVENT, 1);
+        self.send(BUTTON_PRESS_EVENT, button);
         self.point(to);
-        self.send(BUTTON_RELEASE_EVENT, 1);
+        self.send(BUTTON_RELEASE_EVENT, button);
     }
 
     /// Presses and releases the first button of the pointer at a pixel of the window.
     pub fn click(&self, at: [i16; 2]) {
-        self.drag(at, at);
+        self.drag(1, at, at);
     }
 
     /// Gives the window another size, as a window manager does.
