@@ -232,8 +232,7 @@ fn bookmark(view: &mut View<'_>, folder: &Folder, is_wanted: impl Fn(&str) -> bo
         if folder.path().join(&name).exists() {
             continue;
         }
-        view.tap("b");
-        view.wait_for_file(&name);
+        view.write_by("b", &name);
         // The file appears whole, under its name.
         let text = std::fs::read_to_string(folder.path().join(&name)).unwrap();
         if is_wanted(&text) {

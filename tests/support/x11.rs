@@ -25,6 +25,8 @@ use super::command::{Folder, Run, end_of, program};
 
 /// Longest wait for anything: a first render compiles its pipelines, on a machine that may be busy.
 const LONGEST: Duration = Duration::from_secs(120);
+/// Time after which a key is taken for lost.
+const LOST: Duration = Duration::from_secs(10);
 const POLL: Duration = Duration::from_millis(20);
 
 /// An X server without a screen.
@@ -170,6 +172,19 @@ impl<'a> View<'a> {
     #[track_caller]
     pub fn wait_for_file(&mut self, name: &str) {
         self.wait(name, |view| view.folder.path().join(name).exists());
+    }
+
+    /// Taps a key that writes a file until it is there: a busy display may lose one, but not each of them.
+    #[track_caller]
+    pub fn write_by(&mut self, key: &str, name: &str) {
+        let (start, mut taps) = (Instant::now(), 0);
+        while !self.folder.path().join(name).exists() {
+            if start.elapsed() >= taps * LOST {
+                self.tap(key);
+                taps += 1;
+            }
+            self.assert_running(start, name);
+        }
     }
 
     /// Title of the window.
