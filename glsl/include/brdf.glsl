@@ -191,6 +191,13 @@ Between theta_half_bins(float theta_half) {
         float(MEASURED_THETA_HALF_BINS) * sqrt(theta_half * (2.0 / PI)), MEASURED_THETA_HALF_BINS);
 }
 
+// Bins of θ_d and φ_d, as many as a grid has.
+void difference_bins(
+    vec3 angles, uint theta_count, uint phi_count, out Between theta, out Between phi) {
+    theta = held_bins(float(theta_count) * angles.y * (2.0 / PI), theta_count);
+    phi = closed_bins(float(phi_count) * angles.z / PI, phi_count);
+}
+
 // Mixes two cells of a row that starts at a word: RGB from three halves.
 vec3 measured_cells(uint row, Between phi) {
     uvec2 cells = row / 2u + phi.bins;
@@ -202,11 +209,11 @@ vec3 measured_cells(uint row, Between phi) {
 // Measured BRDF, trilinear between the centres of the grid's bins; periodic in φ_d.
 vec3 measured_value(uint table_offset, vec3 angles) {
     Between theta_half = theta_half_bins(angles.x);
-    Between theta_difference = held_bins(
-        float(MEASURED_THETA_DIFFERENCE_BINS) * angles.y * (2.0 / PI),
-        MEASURED_THETA_DIFFERENCE_BINS);
-    Between phi = closed_bins(
-        float(MEASURED_PHI_DIFFERENCE_BINS) * angles.z / PI, MEASURED_PHI_DIFFERENCE_BINS);
+    Between theta_difference;
+    Between phi;
+    difference_bins(
+        angles, MEASURED_THETA_DIFFERENCE_BINS, MEASURED_PHI_DIFFERENCE_BINS, theta_difference,
+        phi);
     vec3 value = vec3(0.0);
     for (uint corner = 0u; corner < 4u; ++corner) {
         float weight = 1.0;
@@ -225,14 +232,13 @@ vec3 measured_turn(uint table_offset, vec3 angles, vec3 half_vector, vec2 axis) 
     float x = dot(axis, half_vector.xy);
     float azimuth = (x == 0.0 && y == 0.0) ? 0.0 : atan(y, x);
     Between theta_half = theta_half_bins(angles.x);
-    Between theta_difference = held_bins(
-        float(MEASURED_TURN_THETA_DIFFERENCE_BINS) * angles.y * (2.0 / PI),
-        MEASURED_TURN_THETA_DIFFERENCE_BINS);
+    Between theta_difference;
+    Between phi;
+    difference_bins(
+        angles, MEASURED_TURN_THETA_DIFFERENCE_BINS, MEASURED_TURN_PHI_DIFFERENCE_BINS,
+        theta_difference, phi);
     Between turn = closed_bins(
         float(MEASURED_TURN_BINS) * (azimuth * (0.5 / PI) + 0.5), MEASURED_TURN_BINS);
-    Between phi = closed_bins(
-        float(MEASURED_TURN_PHI_DIFFERENCE_BINS) * angles.z / PI,
-        MEASURED_TURN_PHI_DIFFERENCE_BINS);
     vec3 factor = vec3(0.0);
     for (uint corner = 0u; corner < 8u; ++corner) {
         float weight = 1.0;

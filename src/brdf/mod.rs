@@ -15,7 +15,7 @@
 //! | principled | GGX with Schlick's reflectance, over (1−metallic)·(1−F)·ρ/π | visible normals or cosine, by albedo |
 //! | coated | GGX coat with Schlick's reflectance, over principled·T(θ_o)·T(θ_i) | visible normals of either or cosine, by albedo |
 //! | sheen | Charlie's sheen, over principled·T(θ_o)·T(θ_i) | uniform, visible normals or cosine, by albedo |
-//! | measured | trilinear on the half/difference grid | tabulated half vectors or cosine |
+//! | measured | trilinear on the half/difference grid, by the factor of a turn | tabulated half vectors or cosine |
 //!
 //! E(θ) is the directional albedo of the coat and Ē its cosine-weighted mean. Coat and base
 //! together reflect exactly E + ρ(1 − E): reciprocal, and lossless for a white base (\[Kelemen &

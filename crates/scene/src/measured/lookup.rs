@@ -100,6 +100,12 @@ fn theta_half_bins(theta_half: f32) -> Between {
     )
 }
 
+/// Bins of θ_d and φ_d, as many as a grid has.
+fn difference_bins(angles: Vec3, theta_count: u32, phi_count: u32) -> (Between, Between) {
+    let theta = held_bins(theta_count as f32 * angles.y * (2.0 / PI), theta_count);
+    (theta, closed_bins(phi_count as f32 * angles.z / PI, phi_count))
+}
+
 /// Mixes two cells of a row that starts at a word: RGB from three halves.
 fn measured_cells(brdf_table: &[u32], row: u32, phi: &Between) -> Vec3 {
     let half = |bits: u32| f16::from_bits(bits as u16).to_f32();
@@ -114,14 +120,8 @@ fn measured_cells(brdf_table: &[u32], row: u32, phi: &Between) -> Vec3 {
 /// Measured BRDF, trilinear between the centres of the grid's bins; periodic in φ_d.
 pub fn measured_value(brdf_table: &[u32], table_offset: u32, angles: Vec3) -> Vec3 {
     let theta_half = theta_half_bins(angles.x);
-    let theta_difference = held_bins(
-        MEASURED_THETA_DIFFERENCE_BINS as f32 * angles.y * (2.0 / PI),
-        MEASURED_THETA_DIFFERENCE_BINS,
-    );
-    let phi = closed_bins(
-        MEASURED_PHI_DIFFERENCE_BINS as f32 * angles.z / PI,
-        MEASURED_PHI_DIFFERENCE_BINS,
-    );
+    let (theta_difference, phi) =
+        difference_bins(angles, MEASURED_THETA_DIFFERENCE_BINS, MEASURED_PHI_DIFFERENCE_BINS);
     let mut value = Vec3::ZERO;
     for corner in 0..4 {
         let (half, half_weight) = side(&theta_half, corner & 1 != 0);
@@ -146,16 +146,13 @@ pub fn measured_turn(
     let x = axis.dot(half_vector.truncate());
     let azimuth = if x == 0.0 && y == 0.0 { 0.0 } else { y.atan2(x) };
     let theta_half = theta_half_bins(angles.x);
-    let theta_difference = held_bins(
-        MEASURED_TURN_THETA_DIFFERENCE_BINS as f32 * angles.y * (2.0 / PI),
+    let (theta_difference, phi) = difference_bins(
+        angles,
         MEASURED_TURN_THETA_DIFFERENCE_BINS,
+        MEASURED_TURN_PHI_DIFFERENCE_BINS,
     );
     let turn =
         closed_bins(MEASURED_TURN_BINS as f32 * (azimuth * (0.5 / PI) + 0.5), MEASURED_TURN_BINS);
-    let phi = closed_bins(
-        MEASURED_TURN_PHI_DIFFERENCE_BINS as f32 * angles.z / PI,
-        MEASURED_TURN_PHI_DIFFERENCE_BINS,
-    );
     let mut factor = Vec3::ZERO;
     for corner in 0..8 {
         let (half, half_weight) = side(&theta_half, corner & 1 != 0);

@@ -158,9 +158,9 @@ impl MeasuredTable {
             }
         });
         // Where a direction is below the surface, as at the last θ_d or else θ_h before.
-        for first in (0..THETA_HALF).flat_map(|half| (0..slice).map(move |at| (half, at))) {
-            fill_line(&mut factors, first.0 * differences * slice + first.1, slice, differences);
-        }
+        factors.par_chunks_mut(differences * slice).for_each(|factors| {
+            (0..slice).for_each(|first| fill_line(factors, first, slice, differences));
+        });
         for first in 0..differences * slice {
             fill_line(&mut factors, first, differences * slice, THETA_HALF);
         }
