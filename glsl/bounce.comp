@@ -27,7 +27,7 @@ void bounce_path(uint path) {
         direction = to_world(frame, incident_local);
         factor = bounce_factor(hit, reflector, incident_local, direction, pdf);
     } else {
-        factor = specular_factor(path, hit, material, frame, outgoing_local, u, direction);
+        factor = specular_factor(path, hit, material, frame, outgoing_local, u, direction, pdf);
     }
     follow_bounce(path, index, hit, direction, pdf, factor, index.sample_index, wave.seed);
 }

@@ -29,13 +29,14 @@ void add_emission(uint path) {
     vec3 radiance = emitted_radiance(
         hit.triangle, barycentric(hit.triangle, instance, ray.origin, ray.direction), is_behind);
     float weight = 1.0;
-    if (ray.brdf_pdf > 0.0) {
+    float pdf = abs(ray.brdf_pdf);
+    if (pdf > 0.0) {
         float cosine = abs(dot(ray.direction, hit.geometric_normal));
         float density = surface.emission_density;
         if (HAS_LAMP_CELLS) {
             density *= lamp_ratio(lamp_lists[path], lamp_clusters[hit.triangle]);
         }
-        weight = ray.brdf_pdf / (ray.brdf_pdf + lamp_pdf(density, hit.distance, cosine));
+        weight = pdf / (pdf + lamp_pdf(density, hit.distance, cosine));
     }
     PathState state = paths[path];
     precise vec3 light = state.throughput * radiance * weight;

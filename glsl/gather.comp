@@ -1,6 +1,6 @@
 // Adds visible shadow rays to every path, and the environment where rays escape: all of it where no
 // light was sampled, which is seen directly, in a mirror or through glass; else the share of the
-// bounce ray among the samples of `mis`, or nothing.
+// bounce ray among the samples of `mis`, or beside that of sample_lamps.comp at rough glass, or nothing.
 #version 460
 
 #include "environment.glsl"
@@ -16,18 +16,21 @@ UPDATES(paths)
 
 void gather_path(uint path) {
     uint path_count = wave_path_count();
-    if (load_hit(path).material == NO_MATERIAL) {
+    Hit hit = load_hit(path);
+    if (hit.material == NO_MATERIAL && !(wave.to_lamps != 0u && hit.triangle != NO_TRIANGLE)) {
         Ray ray = load_ray(path);
         bool is_first = wave.first_shadow_ray == 0u && wave.to_lamps == 0u;
         uint rays = wave.arriving_shadow_rays;
-        if (is_first && ray.is_active != 0u && (ray.brdf_pdf == 0.0 || rays > 0u)
-            && load_hit(path).triangle == NO_TRIANGLE) {
+        if (is_first && ray.is_active != 0u && (ray.brdf_pdf <= 0.0 || rays > 0u)
+            && hit.triangle == NO_TRIANGLE) {
             vec4 light = environment_light(ray.direction);
             float weight = 1.0;
-            if (ray.brdf_pdf > 0.0) {
+            if (ray.brdf_pdf != 0.0) {
                 float environment_density = environment_pdf(ray.direction, light);
-                weight = ray.brdf_pdf
-                    / (float(rays) * mis_pdf(ray.brdf_pdf, environment_density, rays, 1u));
+                float all = ray.brdf_pdf < 0.0
+                    ? ray.brdf_pdf - environment_density
+                    : float(rays) * mis_pdf(ray.brdf_pdf, environment_density, rays, 1u);
+                weight = ray.brdf_pdf / all;
             }
             PathState state = paths[path];
             precise vec3 found = state.throughput * light.xyz * weight;

@@ -4,8 +4,8 @@ use bytemuck::{Pod, Zeroable};
 use fenestra::shader::{
     bindings::scene,
     constants::{
-        CONSTANT_SURFACES, MATERIAL_MEASURED, MATERIAL_MIRROR, SURFACES_ANISOTROPIC,
-        SURFACES_BECKMANN,
+        CONSTANT_SURFACES, MATERIAL_DIELECTRIC, MATERIAL_MEASURED, MATERIAL_MIRROR,
+        SURFACES_ANISOTROPIC, SURFACES_BECKMANN,
     },
 };
 use glam::Vec3;
@@ -125,6 +125,7 @@ struct SpecularQuery {
     material: u32,
     is_back: u32,
     distance: f32,
+    incident_local: Vec3,
 }
 
 /// Twin of `SpecularAnswer` in `glsl/test/specular.comp`.
@@ -134,8 +135,11 @@ struct SpecularAnswer {
     direction_local: Vec3,
     is_transmitted: u32,
     weight: Vec3,
+    pdf: f32,
     reflectance: Vec3,
     transmittance: Vec3,
+    toward_weight: Vec3,
+    toward_pdf: f32,
 }
 
 #[test]
@@ -144,7 +148,10 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
         let material = index % specular().len() as u32;
         let (outgoing_local, u) = (hemisphere(index, 11), uniform(index, 12));
         let distance = uniform(index, 13).x;
-        SpecularQuery { outgoing_local, u, material, is_back: index / 3 % 2, distance }
+        let mut incident_local = hemisphere(index, 14);
+        incident_local.z *= if index / 6 % 2 == 0 { 1.0 } else { -1.0 };
+        let is_back = index / 3 % 2;
+        SpecularQuery { outgoing_local, u, material, is_back, distance, incident_local }
     };
     let queries: Vec<SpecularQuery> = (0..20_000).map(query).collect();
     let answers: Vec<SpecularAnswer> = support::run_probe(
@@ -157,6 +164,7 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
     // In rare cases, rounding moves a number across the probability of reflection, or a direction
     // across the horizon.
     let mut other_choices = 0;
+    let mut densities = 0;
     for (query, answer) in queries.iter().zip(&answers) {
         let material = &specular()[query.material as usize];
         let is_back = query.is_back == 1;
@@ -175,6 +183,30 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
                 "{answer:?} in the shader, {found:?} in its twin, for {query:?}"
             );
         }
+        let toward = |incident_local: Vec3| {
+            let outgoing_local = query.outgoing_local;
+            specular::dielectric_evaluate_and_pdf(material, outgoing_local, incident_local, is_back)
+        };
+        if material.kind == MATERIAL_DIELECTRIC {
+            let (value, pdf) = toward(query.incident_local);
+            let (found, found_pdf) = (answer.toward_weight * answer.toward_pdf, answer.toward_pdf);
+            let expected = value * query.incident_local.z.abs();
+            assert!(
+                difference(found, expected, 1e-3) < 5e-3
+                    && (found_pdf - pdf).abs() <= 5e-3 * pdf + 1e-3,
+                "{found} and {found_pdf} in the shader, {expected} and {pdf} in its twin, for {query:?}"
+            );
+            // Grazing directions amplify rounding.
+            let sampled = answer.direction_local;
+            if answer.weight != Vec3::ZERO && sampled.z.abs().min(query.outgoing_local.z) > 0.05 {
+                let pdf = toward(sampled.normalize()).1;
+                assert!(
+                    (answer.pdf - pdf).abs() <= 0.03 * pdf,
+                    "{answer:?}, not {pdf}, for {query:?}"
+                );
+                densities += u32::from(pdf > 0.0);
+            }
+        }
         let cosine = query.outgoing_local.z;
         let pane = [
             specular::pane_reflectance(material, cosine),
@@ -187,4 +219,5 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
         }
     }
     assert!(other_choices < 20, "{other_choices} choices differ");
+    assert!(densities > queries.len() as u32 / 4, "{densities} densities are not 0");
 }

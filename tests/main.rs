@@ -58,6 +58,7 @@ mod product;
 mod properties;
 mod random;
 mod render;
+mod rough_glass;
 mod round_trip;
 mod scene_file;
 mod sharing;

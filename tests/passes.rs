@@ -24,7 +24,8 @@ use fenestra::{
     shader::{
         constants::{
             AOV_ALBEDO, AOV_CACHE_ENTRIES, AOV_GUIDE_CELL, AOV_OBJECTS, MATERIAL_PLASTIC,
-            SURFACES_EMITTING, SURFACES_SPECULAR, SURFACES_TEXTURED, TRAINING_WAVE,
+            SURFACES_EMITTING, SURFACES_ROUGH_GLASS, SURFACES_SPECULAR, SURFACES_TEXTURED,
+            TRAINING_WAVE,
         },
         spirv::PASSES,
         structs::Wave,
@@ -307,6 +308,12 @@ fn paths_end_at_light_that_is_not_sampled() {
     assert_eq!(
         listed(&glass, wave(0, 1)),
         "camera trace sample shadow gather features bounce trace features gather deposit"
+    );
+    let rough = direct(SURFACES_SPECULAR | SURFACES_ROUGH_GLASS, 0);
+    assert_eq!(
+        listed(&rough, wave(0, 1)),
+        "camera trace sample_lamps shadow gather sample shadow gather features bounce trace features \
+         gather deposit"
     );
     let lamp = direct(0, 1);
     assert_eq!(

@@ -123,11 +123,12 @@ fn picture(scene: &Scene, tracer: Tracer) -> Option<Vec<[f32; 3]>> {
 }
 
 /// Cut-out leaves, panes, solid glass and textures: the same chances at surfaces that let light pass. Before
-/// them, a pane with holes that fills the picture.
+/// them, a pane with holes that fills the picture; after them, rough glass by a lamp.
 #[test]
 fn host_and_device_draw_the_same_picture() {
     let kind =
         MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: Vec3::ONE };
+    let rough = MaterialKind::glass(1.5, 0.3);
     let mut pane = Material::new("pane", kind);
     pane.surface.opacity.factor = 0.6;
     let mut holes = scenes::plane(Vec3::ONE, scenes::sky());
@@ -142,6 +143,9 @@ fn host_and_device_draw_the_same_picture() {
     let tinted = panes.map(|material| material.surface.color = color.clone()).count();
     assert!(tinted > 0 && color.is_some());
     assert_same_pictures(&scene);
+    let mut glass = scenes::room(vec![scenes::diffuse(Vec3::ONE), Material::new("glass", rough)]);
+    scenes::add_point(&mut glass, Vec3::new(0.5, 1.5, 0.5), Vec3::ONE);
+    assert_same_pictures(&glass);
 }
 
 fn assert_same_pictures(scene: &Scene) {

@@ -55,7 +55,7 @@ void bounce_path(uint path) {
             * reservoir_factor(reservoir, BOUNCE_CANDIDATES);
         learns = first + chosen_direction;
     } else {
-        factor = specular_factor(path, hit, material, frame, outgoing_local, u, direction);
+        factor = specular_factor(path, hit, material, frame, outgoing_local, u, direction, pdf);
     }
     // The throughput depends on the tables, and so roulette takes the numbers since their rebuild too.
     if (follow_bounce(path, index, hit, direction, pdf, factor, number, wave.epoch_seed)) {

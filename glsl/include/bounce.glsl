@@ -80,22 +80,25 @@ bool goes_on_from(uint path, Hit hit, out Material material) {
     return samples_light || is_specular(material.kind);
 }
 
-// Returns what bounce_factor returns for a direction drawn at a specular surface, and that direction.
+// Returns what bounce_factor returns for a direction drawn at a specular surface, and that direction. The
+// density is negative, as in Ray.
 vec3 specular_factor(
     uint path, Hit hit, Material material, Frame frame, vec3 outgoing_local, vec3 u,
-    out vec3 direction) {
+    out vec3 direction, out float pdf) {
     Scatter scattered;
     if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
         // trace.comp has let the rest through, by the geometric normal.
         float cosine = abs(dot(hit.geometric_normal, rays[path].direction));
         scattered = Scatter(
-            vec3(-outgoing_local.xy, outgoing_local.z), pane_reflectance(material, cosine), false);
+            vec3(-outgoing_local.xy, outgoing_local.z), pane_reflectance(material, cosine), false,
+            0.0);
     } else {
         bool is_behind = is_back(hit.triangle, load_hit_instance(path), rays[path].direction);
         scattered = scatter(material, outgoing_local, is_behind, u);
         scattered.weight *= inside_transmittance(material, is_behind, hit.distance);
     }
     direction = to_world(frame, scattered.direction_local);
+    pdf = HAS_ROUGH_GLASS ? -scattered.pdf : 0.0;
     bool is_behind = dot(direction, hit.geometric_normal) < 0.0;
     // A shading normal may send light through an opaque surface, or reflect it from a clear one.
     return is_behind == scattered.is_transmitted ? scattered.weight : vec3(0.0);

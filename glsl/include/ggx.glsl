@@ -136,6 +136,13 @@ vec3 ggx_normal_sample(vec3 outgoing_local, GgxWidth width, float cap_factor, ve
     return normalize(ggx_stretched(vec3(normal.xy, max(1e-7, normal.z)), width));
 }
 
+// Density of all visible normals, per steradian, over the cosine of outgoing direction and normal:
+// G₁·D/cosθ_o. [Heitz 2014] Eq. 21.
+float ggx_visible_density(vec3 normal, vec3 outgoing_local, GgxWidth width) {
+    return 2.0 * ggx_normal_density(normal, width)
+        / (outgoing_local.z + ggx_stretched_length(outgoing_local, width));
+}
+
 // D·G₂ of both directions over GGX's D·G₁ of the outgoing one; height-correlated on one side, and the same
 // expression where the other direction is below the surface. 0…1 for GGX.
 float visible_normal_ratio(vec3 normal, vec3 outgoing_local, vec3 incident_local, GgxWidth width) {

@@ -1,5 +1,6 @@
 // Mirrors, dielectrics and thin panes: materials at which paths go on in a sampled direction, and no
-// light is sampled. Twin of tests/twin/specular.rs, same names, same order.
+// sampler draws light; sample_lamps.comp does at rough dielectrics. Twin of tests/twin/specular.rs, same
+// names, same order.
 //
 // Directions are unit vectors in the shading frame, whose z points to the side of the viewer, and point
 // away from the surface: transmitted ones have z < 0. Values are per steradian without the cosine.
@@ -16,6 +17,8 @@ struct Scatter {
     // Value * |cosine| / density.
     vec3 weight;
     bool is_transmitted;
+    // Density per steradian at a rough dielectric; 0 of a single direction.
+    float pdf;
 };
 
 // Refractive index of the side that the viewer does not see over that of the viewer's.
@@ -36,35 +39,62 @@ vec3 refracted(vec3 outgoing_local, vec3 normal, float eta) {
     return (cosine / eta - refracted_cosine(cosine, eta)) * normal - outgoing_local / eta;
 }
 
-// Interface of a dielectric: smooth at alpha = 0, else by GGX's visible normals. [Walter et al. 2007].
+// Sends light along a direction by the normal between it and the viewer's, at an interface of relative index
+// `eta`; `probability` is that of reflection. [Walter et al. 2007].
+Scatter interface_scatter(
+    Material material, vec3 outgoing_local, vec3 normal, float eta, vec3 incident_local,
+    bool is_transmitted, float fresnel, float probability) {
+    Scatter result = Scatter(incident_local, vec3(0.0), is_transmitted, 0.0);
+    float cosine = dot(outgoing_local, normal);
+    // A normal may send light to the wrong side of the surface: no sample.
+    if (cosine <= 0.0 || (incident_local.z < 0.0) != is_transmitted) {
+        return result;
+    }
+    float chosen = max(is_transmitted ? 1.0 - probability : probability, 1.0e-20);
+    result.weight = is_transmitted ? (1.0 - fresnel) / (chosen * eta * eta) * material.eta
+                                   : fresnel / chosen * material.reflectance;
+    if (material.alpha > 0.0) {
+        GgxWidth width = material_width(material);
+        result.weight *= visible_normal_ratio(normal, outgoing_local, incident_local, width);
+        float incident_cosine = dot(incident_local, normal);
+        float sum = cosine + eta * incident_cosine;
+        float turned = is_transmitted ? eta * eta * cosine * abs(incident_cosine) / (sum * sum) : 0.25;
+        result.pdf = chosen * turned * ggx_visible_density(normal, outgoing_local, width);
+    }
+    return result;
+}
+
+// Interface of a dielectric: smooth at alpha = 0, else by GGX's visible normals.
 Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back, vec3 u) {
     float eta = relative_index(material, is_back);
     vec3 normal = vec3(0.0, 0.0, 1.0);
-    GgxWidth width = material_width(material);
     if (material.alpha > 0.0) {
-        normal = ggx_normal_sample(outgoing_local, width, 1.0, u.yz);
+        normal = ggx_normal_sample(outgoing_local, material_width(material), 1.0, u.yz);
     }
     float cosine = dot(outgoing_local, normal);
     float fresnel = fresnel_interface(cosine, eta);
     float probability = reflection_probability(material, fresnel);
-    Scatter result;
-    result.is_transmitted = u.x >= probability;
-    if (result.is_transmitted) {
-        result.direction_local = refracted(outgoing_local, normal, eta);
-        result.weight = (1.0 - fresnel) / ((1.0 - probability) * eta * eta) * material.eta;
-    } else {
-        result.direction_local = 2.0 * cosine * normal - outgoing_local;
-        result.weight = fresnel / probability * material.reflectance;
+    bool is_transmitted = u.x >= probability;
+    vec3 incident_local = is_transmitted ? refracted(outgoing_local, normal, eta)
+                                         : 2.0 * cosine * normal - outgoing_local;
+    return interface_scatter(
+        material, outgoing_local, normal, eta, incident_local, is_transmitted, fresnel, probability);
+}
+
+// Weight and density of that for a given direction; 0 at a smooth dielectric.
+Scatter dielectric_toward(Material material, vec3 outgoing_local, bool is_back, vec3 incident_local) {
+    float eta = relative_index(material, is_back);
+    bool is_transmitted = incident_local.z < 0.0;
+    vec3 half_vector = outgoing_local + (is_transmitted ? eta : 1.0) * incident_local;
+    vec3 normal = normalize(half_vector.z < 0.0 ? -half_vector : half_vector);
+    bool is_refracted = dot(incident_local, normal) < 0.0;
+    if (material.alpha == 0.0 || outgoing_local.z <= 0.0 || is_refracted != is_transmitted) {
+        return Scatter(incident_local, vec3(0.0), is_transmitted, 0.0);
     }
-    if (material.alpha > 0.0) {
-        result.weight *=
-            visible_normal_ratio(normal, outgoing_local, result.direction_local, width);
-    }
-    // A normal may send light to the wrong side of the surface: no sample.
-    if (cosine <= 0.0 || (result.direction_local.z < 0.0) != result.is_transmitted) {
-        result.weight = vec3(0.0);
-    }
-    return result;
+    float fresnel = fresnel_interface(dot(outgoing_local, normal), eta);
+    return interface_scatter(
+        material, outgoing_local, normal, eta, incident_local, is_transmitted, fresnel,
+        reflection_probability(material, fresnel));
 }
 
 // Share that is left of light which reaches a surface over `distance`: a viewer at the back of a dielectric
@@ -83,9 +113,9 @@ Scatter pane_scatter(Material material, vec3 outgoing_local, vec3 u) {
     float probability = sum > 0.0 ? reflected / sum : 1.0;
     if (u.x < probability) {
         return Scatter(
-            vec3(-outgoing_local.xy, outgoing_local.z), reflectance / probability, false);
+            vec3(-outgoing_local.xy, outgoing_local.z), reflectance / probability, false, 0.0);
     }
-    return Scatter(-outgoing_local, transmittance / (1.0 - probability), true);
+    return Scatter(-outgoing_local, transmittance / (1.0 - probability), true, 0.0);
 }
 
 // Samples the next direction of a path with three numbers in [0, 1). `is_back` tells that the viewer
@@ -94,7 +124,7 @@ Scatter scatter(Material material, vec3 outgoing_local, bool is_back, vec3 u) {
     if (outgoing_local.z > 0.0 && is_kind(material, MATERIAL_MIRROR)) {
         return Scatter(
             vec3(-outgoing_local.xy, outgoing_local.z),
-            (is_back ? material.ior : 1.0) * material.reflectance, false);
+            (is_back ? material.ior : 1.0) * material.reflectance, false, 0.0);
     }
     if (outgoing_local.z > 0.0 && is_kind(material, MATERIAL_DIELECTRIC)) {
         return dielectric_scatter(material, outgoing_local, is_back, u);
@@ -102,5 +132,5 @@ Scatter scatter(Material material, vec3 outgoing_local, bool is_back, vec3 u) {
     if (outgoing_local.z > 0.0 && is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
         return pane_scatter(material, outgoing_local, u);
     }
-    return Scatter(vec3(0.0, 0.0, 1.0), vec3(0.0), false);
+    return Scatter(vec3(0.0, 0.0, 1.0), vec3(0.0), false, 0.0);
 }

@@ -15,6 +15,7 @@ const bool HAS_LAMP_CELLS = (SURFACES & SURFACES_LAMP_CELLS) != 0u;
 const bool IS_TEXTURED = (SURFACES & SURFACES_TEXTURED) != 0u;
 const bool HAS_TINTED_PANES = (SURFACES & SURFACES_TINTED_PANES) != 0u;
 const bool HAS_BECKMANN = (SURFACES & SURFACES_BECKMANN) != 0u;
+const bool HAS_ROUGH_GLASS = (SURFACES & SURFACES_ROUGH_GLASS) != 0u;
 const bool IS_ANISOTROPIC = (SURFACES & SURFACES_ANISOTROPIC) != 0u;
 
 // Tests whether a kind of material is specular: no light is sampled at it.

@@ -52,7 +52,8 @@ void connect_path(uint path) {
     FirstVertex first = load_first_vertex(path);
     if (wave.first_shadow_ray == 0u) {
         hits[path] = Hit(
-            first.position, first.material, first.geometric_normal, 0.0, first.shading_normal, 0u);
+            first.position, first.material, first.geometric_normal, 0.0, first.shading_normal,
+            NO_TRIANGLE);
         seen[path] = uvec2(0u);
     }
     if (first.material == NO_MATERIAL) {

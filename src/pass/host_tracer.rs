@@ -247,7 +247,9 @@ impl Visible<'_> {
 
     /// The shadow ray from `hit`, unless it needs no tracing.
     fn segment(&self, hit: &Hit, ray: ShadowRay) -> Option<Segment> {
-        if hit.material == NO_MATERIAL || ray.contribution == [0.0; 3] {
+        let is_lit =
+            hit.material != NO_MATERIAL || self.wave.to_lamps != 0 && hit.triangle != NO_TRIANGLE;
+        if !is_lit || ray.contribution == [0.0; 3] {
             return None;
         }
         let position = Vec3::from(hit.position);

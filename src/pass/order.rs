@@ -11,7 +11,8 @@ use super::{
 use crate::shader::{
     constants::{
         AOV_ALBEDO, AOV_MATERIALS, AOV_NORMAL, AOV_OBJECTS, AOV_POSITION, CONSTANT_ONLY_SPECULAR,
-        PATH_LISTS, SURFACES_EMITTING, SURFACES_SPECULAR, SURFACES_TEXTURED, TRAINING_WAVE,
+        PATH_LISTS, SURFACES_EMITTING, SURFACES_ROUGH_GLASS, SURFACES_SPECULAR, SURFACES_TEXTURED,
+        TRAINING_WAVE,
     },
     structs::Wave,
 };
@@ -248,14 +249,18 @@ impl<'a> Order<'a> {
     /// One shadow ray to a lamp after another.
     fn sample_lamps(&mut self) {
         let PassSettings { surfaces, traversal, incoherent, .. } = *self.settings;
-        if !self.is_lit() || surfaces.lamp_count == 0 {
+        let has_lamps = surfaces.lamp_count > 0;
+        if !self.is_lit() || !has_lamps && !surfaces.has(SURFACES_ROUGH_GLASS) {
             return;
         }
         // Half as many as to the environment, at least one: docs/experiments.md, rays_to_lamps.
-        let rays = self.wave.total_shadow_rays.div_ceil(2).max(1);
+        let rays = if has_lamps { self.wave.total_shadow_rays.div_ceil(2).max(1) } else { 1 };
         let to_lamps =
             Wave { to_lamps: 1, shadow_ray_count: 1, total_shadow_rays: rays, ..self.wave };
-        let sample = Kernel::new("sample_lamps", Domain::Surfaces, &surfaces.constants());
+        // The density of the environment with which bounce rays will be weighed where they arrive.
+        let density = self.steps.escape(self.wave.vertex + 1).unwrap_or_default();
+        let constants = [surfaces.constants(), density].concat();
+        let sample = Kernel::new("sample_lamps", Domain::Surfaces, &constants);
         for ray in 0..rays {
             let wave = Wave { first_shadow_ray: ray, ..to_lamps };
             self.add_with(sample.clone(), wave);

@@ -6,7 +6,7 @@ use crate::{
     shader::constants::{
         CONSTANT_MATERIAL_KINDS, CONSTANT_SURFACES, SPECULAR_KINDS, SURFACES_ANISOTROPIC,
         SURFACES_BECKMANN, SURFACES_EMITTING, SURFACES_ONE_SIDED, SURFACES_PASSING,
-        SURFACES_SPECULAR, SURFACES_TEXTURED, SURFACES_TINTED_PANES,
+        SURFACES_ROUGH_GLASS, SURFACES_SPECULAR, SURFACES_TEXTURED, SURFACES_TINTED_PANES,
     },
 };
 
@@ -55,6 +55,8 @@ pub(crate) fn passes(material: &Material) -> bool {
 fn features_of(material: &Material) -> u32 {
     let surface = &material.surface;
     let is_pane = matches!(material.kind, MaterialKind::ThinDielectric { .. });
+    let is_rough_glass =
+        matches!(material.kind, MaterialKind::Dielectric { alpha, .. } if alpha > 0.0);
     let is_opaque =
         surface.opacity.factor >= 1.0 && surface.opacity.texture.is_none() && !surface.vertex_color;
     let is_tinted = surface.color.is_some() || surface.vertex_color;
@@ -73,6 +75,7 @@ fn features_of(material: &Material) -> u32 {
         (SURFACES_TINTED_PANES, is_pane && is_tinted),
         (SURFACES_BECKMANN, surface.distribution == Distribution::Beckmann),
         (SURFACES_EMITTING, surface.emission.is_some()),
+        (SURFACES_ROUGH_GLASS, is_rough_glass),
     ]
     .into_iter()
     .fold(0, |bits, (bit, is_needed)| if is_needed { bits | bit } else { bits })

@@ -154,6 +154,8 @@ constants! {
     SURFACES_TINTED_PANES = 256;
     /// Some normals of microfacets are Beckmann's.
     SURFACES_BECKMANN = 512;
+    /// Some dielectrics are rough: `sample_lamps` samples light there.
+    SURFACES_ROUGH_GLASS = 1024;
 
     // Dimensions of random numbers that the host draws too.
     /// First dimension of the first vertex of a path.
@@ -244,7 +246,7 @@ constants! {
     MATERIAL_COATED = 9;
     /// Metallic-roughness material below a sheen.
     MATERIAL_SHEEN = 10;
-    /// Bits `1 << kind` of the specular kinds, at which no light is sampled.
+    /// Bits `1 << kind` of the specular kinds, at which no sampler draws light.
     SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
 
     // Lamps.

@@ -134,7 +134,8 @@ structs! {
         /// Unit direction.
         direction: vec3,
         /// Density of the BRDF's sampling in this direction, per steradian; 0 if no other technique
-        /// samples the light that the ray meets: camera rays, and those from specular surfaces.
+        /// samples the light that the ray meets: camera rays, and those from specular surfaces. Negative
+        /// from rough glass, where `sample_lamps` samples the environment.
         brdf_pdf: float,
     }
 

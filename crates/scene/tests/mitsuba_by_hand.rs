@@ -126,16 +126,3 @@ fn thousands_of_balls_are_copies_of_one() {
     let colors: HashSet<_> = geometry.instances.iter().map(|ball| ball.first_material).collect();
     assert_eq!(colors.len(), geometry.instances.len());
 }
-
-/// No light is sampled at glass, and no path meets a lamp without size.
-#[test]
-fn lamps_that_rough_glass_does_not_show_are_named() {
-    let warnings = |glass: &str, lamp: &str| {
-        let glass = format!("<shape type=\"sphere\"><bsdf type=\"{glass}\"/></shape>");
-        load(&(glass + lamp)).warnings
-    };
-    let lamp = "<emitter type=\"point\"/>";
-    let found = warnings("roughdielectric", lamp);
-    assert!(found[0].ends_with("neither show in rough glass nor shine through it"), "{found:?}");
-    assert_eq!((warnings("roughdielectric", "").len(), warnings("dielectric", lamp).len()), (0, 0));
-}

@@ -236,16 +236,6 @@ impl<'a> Loader<'a> {
         if is_dark {
             scene.warnings.push(format!("{}: no light: nothing is lit", self.path.display()));
         }
-        let is_rough = |material: &Material| match material.kind {
-            MaterialKind::Dielectric { alpha, .. } => alpha > 0.0,
-            _ => false,
-        };
-        if !scene.lamps.is_empty() && scene.materials.iter().any(is_rough) {
-            scene.warnings.push(format!(
-                "{}: lamps without size neither show in rough glass nor shine through it",
-                self.path.display()
-            ));
-        }
         if let Some([low, high]) = bounds(scene.geometry.used_extent()) {
             let (farthest, size) =
                 (low.abs().max(high.abs()).max_element(), (high - low).max_element());
