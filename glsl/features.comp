@@ -17,8 +17,7 @@ UPDATES(features)
 
 // Tests whether paths go on in a single direction of reflection, or of refraction.
 bool is_perfectly_specular(Material material) {
-    return is_specular(material.kind)
-        && (!is_kind(material, MATERIAL_DIELECTRIC) || material.alpha == 0.0);
+    return is_specular(material.kind) && material.alpha == 0.0;
 }
 
 void keep_features(uint path) {

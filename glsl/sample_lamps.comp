@@ -32,7 +32,7 @@ const uint DIMENSIONS_PER_LAMP_VERTEX = 2048u * DIMENSIONS_PER_LAMP_RAY;
 vec3 scattered(Vertex vertex, vec3 incident_local, vec3 direction, bool is_back, out float pdf) {
     Reflector reflector = vertex.reflector;
     bool is_above = dot(direction, vertex.hit.geometric_normal) > 0.0;
-    if (HAS_ROUGH_GLASS && is_kind(reflector.material, MATERIAL_DIELECTRIC)) {
+    if (HAS_ROUGH_GLASS && is_interface(reflector.material)) {
         Scatter found =
             dielectric_toward(reflector.material, reflector.outgoing_local, is_back, incident_local);
         pdf = found.pdf;
@@ -57,7 +57,7 @@ LampSample sample_environment(vec2 u) {
 
 void sample_vertex(uint path, Vertex vertex) {
     Hit hit = vertex.hit;
-    bool is_glass = HAS_ROUGH_GLASS && is_kind(vertex.reflector.material, MATERIAL_DIELECTRIC);
+    bool is_glass = HAS_ROUGH_GLASS && is_interface(vertex.reflector.material);
     // The lamps of glass are outside.
     bool is_inside = is_glass
         && is_back(hit.triangle, load_hit_instance(path), load_ray(path).direction);
@@ -112,8 +112,7 @@ void sample_path(uint path) {
     Hit hit = load_hit(path);
     if (HAS_ROUGH_GLASS && hit.material == NO_MATERIAL && hit.triangle != NO_TRIANGLE) {
         hit.material = triangle_material(hit.triangle, load_hit_instance(path));
-        hit.material =
-            load_material(hit.material).kind == MATERIAL_DIELECTRIC ? hit.material : NO_MATERIAL;
+        hit.material = is_interface(load_material(hit.material)) ? hit.material : NO_MATERIAL;
     }
     if (hit.material != NO_MATERIAL) {
         sample_vertex(path, load_vertex(path, hit));

@@ -5,7 +5,7 @@ use fenestra::shader::{
     bindings::scene,
     constants::{
         CONSTANT_SURFACES, MATERIAL_DIELECTRIC, MATERIAL_MEASURED, MATERIAL_MIRROR,
-        SURFACES_ANISOTROPIC, SURFACES_BECKMANN,
+        MATERIAL_ROUGH_PANE, SURFACES_ANISOTROPIC, SURFACES_BECKMANN,
     },
 };
 use glam::Vec3;
@@ -187,7 +187,7 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
             let outgoing_local = query.outgoing_local;
             specular::dielectric_evaluate_and_pdf(material, outgoing_local, incident_local, is_back)
         };
-        if material.kind == MATERIAL_DIELECTRIC {
+        if matches!(material.kind, MATERIAL_DIELECTRIC | MATERIAL_ROUGH_PANE) {
             let (value, pdf) = toward(query.incident_local);
             let (found, found_pdf) = (answer.toward_weight * answer.toward_pdf, answer.toward_pdf);
             let expected = value * query.incident_local.z.abs();

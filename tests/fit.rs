@@ -391,7 +391,7 @@ fn hopeless_materials_are_refused() {
     for kind in [
         MaterialKind::Mirror { reflectance: white },
         MaterialKind::glass(1.5, 0.2),
-        MaterialKind::ThinDielectric { ior: 1.5, reflectance: white, transmittance: white },
+        MaterialKind::pane(1.5, white),
     ] {
         assert_error(
             brdf_lobes(&material(kind), 0, "glass", options, None, &mut |_| ()),

@@ -68,8 +68,13 @@ fn hall() -> Scene {
 fn surfaces_are_shown_in_mirrors_and_through_glass() {
     let _alone = support::alone();
     let mirror = MaterialKind::Mirror { reflectance: Vec3::splat(0.5) };
-    let pane =
-        MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: Vec3::ONE };
+    let pane = MaterialKind::pane(1.5, Vec3::ONE);
+    let frosted = MaterialKind::ThinDielectric {
+        ior: 1.5,
+        alpha: 0.3,
+        reflectance: Vec3::ONE,
+        transmittance: Vec3::ONE,
+    };
     let (smooth, rough) = (MaterialKind::glass(1.5, 0.0), MaterialKind::glass(1.5, 0.3));
     let sheet = MaterialKind::DiffuseTransmission {
         reflectance: Vec3::new(0.4, 0.1, 0.3),
@@ -83,6 +88,7 @@ fn surfaces_are_shown_in_mirrors_and_through_glass() {
         (pane, 4, seen, 0.6..=0.95),
         (smooth, 6, seen, 0.6..=0.95),
         (rough, 2, Vec3::ONE, 0.999..=1.0),
+        (frosted, 2, Vec3::ONE, 0.999..=1.0),
         (sheet, 2, Vec3::new(0.5, 0.7, 1.0), 0.999..=1.0),
     ] {
         let mut scene = hall();
@@ -104,7 +110,7 @@ fn surfaces_are_shown_in_mirrors_and_through_glass() {
         let found = [&sums.albedo, &sums.normal, &sums.position].map(|layer| mean(layer));
         assert!((found[0] - albedo).abs().max_element() < 1e-3, "{kind:?}: {found:?}");
         assert!(normal.contains(&found[1].y), "{kind:?}: {found:?}");
-        let is_pane = matches!(kind, MaterialKind::ThinDielectric { .. });
+        let is_pane = matches!(kind, MaterialKind::ThinDielectric { alpha: 0.0, .. });
         assert!(is_pane || (found[2].y - 1.5).abs() < 1e-3, "{kind:?}: {found:?}");
         assert!(support::render_passes(&scene, settings, &[1; 8]) == sums, "{kind:?}");
     }

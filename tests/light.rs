@@ -48,7 +48,7 @@ fn black() -> fenestra::scene::EnvironmentMap {
 }
 
 fn glass(transmittance: Vec3) -> MaterialKind {
-    MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance }
+    MaterialKind::pane(1.5, transmittance)
 }
 
 /// A horizontal plane at y = 0, seen from above, under `environment`, with a sheet at y = 8.
@@ -317,7 +317,7 @@ fn tinted_by_texture(mut glass: Material, tint: Vec3) -> Material {
 fn panes_reflect_and_pass_their_tints_and_emit_all_of_their_light() {
     let _alone = support::alone();
     let [reflectance, transmittance] = [Vec3::new(0.9, 0.7, 0.5), Vec3::new(0.3, 0.8, 0.6)];
-    let pane = MaterialKind::ThinDielectric { ior: 1.5, reflectance, transmittance };
+    let pane = MaterialKind::ThinDielectric { ior: 1.5, alpha: 0.0, reflectance, transmittance };
     let mut scene = between_sky_and_ground(pane);
     for (opacity, tint) in [(1.0, "material"), (0.6, "texture"), (0.8, "vertices")] {
         if tint == "texture" {

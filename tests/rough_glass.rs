@@ -24,15 +24,19 @@ use crate::{
 /// Where the camera is, above the surface or below it, metres; it looks at the origin.
 const VIEWER: Vec3 = vec3(0.0, 3.0, 4.0);
 
+/// Boundary of a solid, and a pane.
+fn kinds() -> [MaterialKind; 2] {
+    let (ior, alpha) = (1.5, 0.3);
+    let [reflectance, transmittance] = [vec3(0.5, 1.0, 0.7), vec3(1.0, 0.6, 0.8)];
+    let absorption = vec3(0.1, 0.0, 0.05);
+    [
+        MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption },
+        MaterialKind::ThinDielectric { ior, alpha, reflectance, transmittance },
+    ]
+}
+
 /// Square of glass at y = 0 whose front is above.
-fn sheet(environment: impl Fn(Vec3) -> Vec3) -> Scene {
-    let glass = MaterialKind::Dielectric {
-        ior: 1.5,
-        alpha: 0.3,
-        reflectance: vec3(0.5, 1.0, 0.7),
-        transmittance: vec3(1.0, 0.6, 0.8),
-        absorption: vec3(0.1, 0.0, 0.05),
-    };
+fn sheet(glass: MaterialKind, environment: impl Fn(Vec3) -> Vec3) -> Scene {
     let mut scene = scenes::plane(Vec3::ZERO, scenes::environment(64, environment));
     scene.materials = vec![Material::new("glass", glass)];
     scene.geometry = Geometry::default();
@@ -78,18 +82,20 @@ fn rough_glass_shows_lamps_without_size() {
     let _alone = support::alone();
     let towards = [vec3(0.2, 0.8, -0.7).normalize(), vec3(-0.1, -0.9, -0.4).normalize()];
     let irradiance = [vec3(3.0, 1.0, 2.0), vec3(1.0, 2.0, 4.0)];
-    let mut scene = sheet(|_| Vec3::ZERO);
-    for (to_lamp, irradiance) in towards.into_iter().zip(irradiance) {
-        scenes::add_lamp(&mut scene, LampKind::Directional { direction: -to_lamp, irradiance });
-    }
-    assert_seen("lamps", &mut scene, |material, outgoing, is_back| {
-        let light = towards.into_iter().zip(irradiance).map(|(to_lamp, irradiance)| {
-            let incident = local(to_lamp, is_back);
-            let value = dielectric_evaluate_and_pdf(material, outgoing, incident, is_back).0;
-            value * incident.z.abs() * irradiance
+    for glass in kinds() {
+        let mut scene = sheet(glass, |_| Vec3::ZERO);
+        for (to_lamp, irradiance) in towards.into_iter().zip(irradiance) {
+            scenes::add_lamp(&mut scene, LampKind::Directional { direction: -to_lamp, irradiance });
+        }
+        assert_seen("lamps", &mut scene, |material, outgoing, is_back| {
+            let light = towards.into_iter().zip(irradiance).map(|(to_lamp, irradiance)| {
+                let incident = local(to_lamp, is_back);
+                let value = dielectric_evaluate_and_pdf(material, outgoing, incident, is_back).0;
+                value * incident.z.abs() * irradiance
+            });
+            light.sum::<Vec3>().as_dvec3()
         });
-        light.sum::<Vec3>().as_dvec3()
-    });
+    }
 }
 
 /// An environment with a bright spot, then one without light beside a glowing square, then both.
@@ -102,10 +108,14 @@ fn rough_glass_shows_light_that_bounces_meet_too() {
         bright * if to.y > 0.0 { vec3(1.0, 0.5, 0.2) } else { vec3(0.2, 0.5, 1.0) }
     };
     let (height, half, glow) = (-2.0, 1.0, vec3(8.0, 4.0, 6.0));
-    for (name, has_sky, has_square) in
-        [("sky", true, false), ("square", false, true), ("both", true, true)]
-    {
-        let mut scene = sheet(|to| if has_sky { sky(to) } else { Vec3::ZERO });
+    let [solid, pane] = kinds();
+    for (name, glass, has_sky, has_square) in [
+        ("sky", solid.clone(), true, false),
+        ("square", solid.clone(), false, true),
+        ("both", solid, true, true),
+        ("pane", pane, true, true),
+    ] {
+        let mut scene = sheet(glass, |to| if has_sky { sky(to) } else { Vec3::ZERO });
         let environment = scene.environment.clone();
         if has_square {
             let mut lamp = scenes::diffuse(Vec3::ZERO);

@@ -233,6 +233,11 @@ fn glass_comes_back() {
         original.assert_same(format, 0.0, &[]);
     }
     assert!(original.again(PBRT).1[0].contains("the colours of its surface"));
+    let original = Original::new(&scene.replace(pane, &format!("{pane}\nalpha = 0.25")));
+    original.assert_same(GLTF, 0.0, &[]);
+    for format in [MITSUBA, PBRT] {
+        assert!(original.again(format).1[0].contains("rough pane becomes a smooth one"));
+    }
 }
 
 #[test]

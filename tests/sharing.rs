@@ -183,8 +183,7 @@ fn nothing_is_shared_from_below_the_horizon_or_past_the_colour_of_a_pane() {
     scenes::add_square(&mut scene.geometry, Vec3::new(11.35, 0.0, 0.0), 10.0, 0);
     scene.geometry.normals[first..].fill([-0.64, 0.77, 0.0]);
     scenes::add_point(&mut scene, Vec3::new(0.3, -0.5, 0.0), Vec3::splat(20.0));
-    let red =
-        MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: Vec3::X };
+    let red = MaterialKind::pane(1.5, Vec3::X);
     scene.materials.push(Material::new("red", red));
     scenes::add_box(&mut scene.geometry, scene.camera.position, Vec3::splat(0.1), 1);
     let picture = render(&scene, settings(Sampler::Mis, "8", 2), &[8]).sum;

@@ -22,7 +22,7 @@ use crate::{
     },
     twin::specular::{
         dielectric_evaluate_and_pdf, fresnel_interface, pane_reflectance, pane_transmittance,
-        scatter,
+        relative_index, scatter,
     },
 };
 
@@ -37,11 +37,6 @@ fn rough() -> impl Iterator<Item = &'static Material> {
 /// Returns the first material of a kind.
 fn first(kind: u32) -> Material {
     *specular().iter().find(|material| material.kind == kind).unwrap()
-}
-
-/// Returns the index beyond the interface over that of the viewer's side.
-fn relative_index(material: &Material, is_back: bool) -> f32 {
-    if is_back { 1.0 / material.ior } else { material.ior }
 }
 
 #[test]

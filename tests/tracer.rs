@@ -126,8 +126,7 @@ fn picture(scene: &Scene, tracer: Tracer) -> Option<Vec<[f32; 3]>> {
 /// them, a pane with holes that fills the picture; after them, rough glass by a lamp.
 #[test]
 fn host_and_device_draw_the_same_picture() {
-    let kind =
-        MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: Vec3::ONE };
+    let kind = MaterialKind::pane(1.5, Vec3::ONE);
     let rough = MaterialKind::glass(1.5, 0.3);
     let mut pane = Material::new("pane", kind);
     pane.surface.opacity.factor = 0.6;

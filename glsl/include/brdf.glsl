@@ -545,7 +545,7 @@ vec3 brdf_albedo(Material material, vec3 outgoing_local) {
         float fresnel = fresnel_interface(abs(outgoing_local.z), material.ior);
         return mix(material.eta, material.reflectance, fresnel);
     }
-    if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
+    if (is_kind(material, MATERIAL_THIN_DIELECTRIC) || is_kind(material, MATERIAL_ROUGH_PANE)) {
         return pane_reflectance(material, outgoing_local.z)
             + pane_transmittance(material, outgoing_local.z);
     }

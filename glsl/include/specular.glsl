@@ -21,9 +21,29 @@ struct Scatter {
     float pdf;
 };
 
-// Refractive index of the side that the viewer does not see over that of the viewer's.
+// Tests for materials that `sample_lamps` samples light at where they are rough.
+bool is_interface(Material material) {
+    return is_kind(material, MATERIAL_DIELECTRIC) || is_kind(material, MATERIAL_ROUGH_PANE);
+}
+
+// Refractive index of the side that the viewer does not see over that of the viewer's; 1 beyond a pane.
 float relative_index(Material material, bool is_back) {
-    return is_back ? 1.0 / material.ior : material.ior;
+    float eta = is_back ? 1.0 / material.ior : material.ior;
+    return is_kind(material, MATERIAL_ROUGH_PANE) ? 1.0 : eta;
+}
+
+// Light that an interface or a pane reflects at a cosine with the normal of a microfacet.
+float facet_reflectance(Material material, float cosine, float eta) {
+    if (is_kind(material, MATERIAL_ROUGH_PANE)) {
+        float once = fresnel_interface(abs(cosine), material.ior);
+        return 2.0 * once / (1.0 + once);
+    }
+    return fresnel_interface(cosine, eta);
+}
+
+// Mirrors a direction at the surface: a pane lets through what it reflects, mirrored.
+vec3 mirrored(vec3 direction) {
+    return vec3(direction.xy, -direction.z);
 }
 
 // Probability of reflection: its part of all light by luminance.
@@ -58,13 +78,16 @@ Scatter interface_scatter(
         result.weight *= visible_normal_ratio(normal, outgoing_local, incident_local, width);
         float incident_cosine = dot(incident_local, normal);
         float sum = cosine + eta * incident_cosine;
-        float turned = is_transmitted ? eta * eta * cosine * abs(incident_cosine) / (sum * sum) : 0.25;
+        float turned = is_transmitted && !is_kind(material, MATERIAL_ROUGH_PANE)
+            ? eta * eta * cosine * abs(incident_cosine) / (sum * sum)
+            : 0.25;
         result.pdf = chosen * turned * ggx_visible_density(normal, outgoing_local, width);
     }
     return result;
 }
 
-// Interface of a dielectric: smooth at alpha = 0, else by GGX's visible normals.
+// Interface of a dielectric, or a rough pane: smooth at alpha = 0, else by GGX's visible normals. The light
+// that the pane lets through is that of `KHR_materials_transmission`.
 Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back, vec3 u) {
     float eta = relative_index(material, is_back);
     vec3 normal = vec3(0.0, 0.0, 1.0);
@@ -72,11 +95,15 @@ Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back,
         normal = ggx_normal_sample(outgoing_local, material_width(material), 1.0, u.yz);
     }
     float cosine = dot(outgoing_local, normal);
-    float fresnel = fresnel_interface(cosine, eta);
+    float fresnel = facet_reflectance(material, cosine, eta);
     float probability = reflection_probability(material, fresnel);
     bool is_transmitted = u.x >= probability;
-    vec3 incident_local = is_transmitted ? refracted(outgoing_local, normal, eta)
-                                         : 2.0 * cosine * normal - outgoing_local;
+    vec3 incident_local = 2.0 * cosine * normal - outgoing_local;
+    if (is_transmitted) {
+        incident_local = is_kind(material, MATERIAL_ROUGH_PANE)
+            ? mirrored(incident_local)
+            : refracted(outgoing_local, normal, eta);
+    }
     return interface_scatter(
         material, outgoing_local, normal, eta, incident_local, is_transmitted, fresnel, probability);
 }
@@ -85,13 +112,16 @@ Scatter dielectric_scatter(Material material, vec3 outgoing_local, bool is_back,
 Scatter dielectric_toward(Material material, vec3 outgoing_local, bool is_back, vec3 incident_local) {
     float eta = relative_index(material, is_back);
     bool is_transmitted = incident_local.z < 0.0;
-    vec3 half_vector = outgoing_local + (is_transmitted ? eta : 1.0) * incident_local;
+    bool is_refracted = is_transmitted && !is_kind(material, MATERIAL_ROUGH_PANE);
+    vec3 facing =
+        is_transmitted && !is_refracted ? mirrored(incident_local) : incident_local;
+    vec3 half_vector = outgoing_local + (is_refracted ? eta : 1.0) * facing;
     vec3 normal = normalize(half_vector.z < 0.0 ? -half_vector : half_vector);
-    bool is_refracted = dot(incident_local, normal) < 0.0;
-    if (material.alpha == 0.0 || outgoing_local.z <= 0.0 || is_refracted != is_transmitted) {
+    bool is_beyond = dot(facing, normal) < 0.0;
+    if (material.alpha == 0.0 || outgoing_local.z <= 0.0 || is_beyond != is_refracted) {
         return Scatter(incident_local, vec3(0.0), is_transmitted, 0.0);
     }
-    float fresnel = fresnel_interface(dot(outgoing_local, normal), eta);
+    float fresnel = facet_reflectance(material, dot(outgoing_local, normal), eta);
     return interface_scatter(
         material, outgoing_local, normal, eta, incident_local, is_transmitted, fresnel,
         reflection_probability(material, fresnel));
@@ -126,7 +156,7 @@ Scatter scatter(Material material, vec3 outgoing_local, bool is_back, vec3 u) {
             vec3(-outgoing_local.xy, outgoing_local.z),
             (is_back ? material.ior : 1.0) * material.reflectance, false, 0.0);
     }
-    if (outgoing_local.z > 0.0 && is_kind(material, MATERIAL_DIELECTRIC)) {
+    if (outgoing_local.z > 0.0 && is_interface(material)) {
         return dielectric_scatter(material, outgoing_local, is_back, u);
     }
     if (outgoing_local.z > 0.0 && is_kind(material, MATERIAL_THIN_DIELECTRIC)) {

@@ -25,7 +25,8 @@ bool is_specular(uint kind) {
 
 // Tests whether a material is glass, whose colour is that of the light that it lets through.
 bool is_glass(Material material) {
-    return material.kind == MATERIAL_DIELECTRIC || material.kind == MATERIAL_THIN_DIELECTRIC;
+    return material.kind == MATERIAL_DIELECTRIC || material.kind == MATERIAL_THIN_DIELECTRIC
+        || material.kind == MATERIAL_ROUGH_PANE;
 }
 
 // Material as the textures at a place vary it.

@@ -144,8 +144,11 @@ impl MaterialTables {
                     converted.eta = transmittance.to_array();
                     converted.k = absorption.to_array();
                 }
-                MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
-                    converted.kind = MATERIAL_THIN_DIELECTRIC;
+                MaterialKind::ThinDielectric { ior, alpha, reflectance, transmittance } => {
+                    let is_rough = *alpha > 0.0;
+                    converted.kind =
+                        if is_rough { MATERIAL_ROUGH_PANE } else { MATERIAL_THIN_DIELECTRIC };
+                    converted.alpha = if is_rough { alpha.max(SMALLEST_ALPHA) } else { 0.0 };
                     converted.ior = *ior;
                     converted.reflectance = reflectance.to_array();
                     converted.eta = transmittance.to_array();

@@ -111,7 +111,9 @@ pub fn brdf_evaluate(
             reflection * reflectance * fresnel_conductor(cosine_difference, eta, k)
         }
         MATERIAL_CONDUCTOR => reflection * fresnel_schlick(cosine_difference, reflectance),
-        MATERIAL_MIRROR | MATERIAL_DIELECTRIC | MATERIAL_THIN_DIELECTRIC => Vec3::ZERO,
+        MATERIAL_MIRROR | MATERIAL_DIELECTRIC | MATERIAL_THIN_DIELECTRIC | MATERIAL_ROUGH_PANE => {
+            Vec3::ZERO
+        }
         kind => panic!("material of the unknown kind {kind}"),
     }
 }

@@ -54,9 +54,11 @@ pub(crate) fn passes(material: &Material) -> bool {
 
 fn features_of(material: &Material) -> u32 {
     let surface = &material.surface;
-    let is_pane = matches!(material.kind, MaterialKind::ThinDielectric { .. });
-    let is_rough_glass =
-        matches!(material.kind, MaterialKind::Dielectric { alpha, .. } if alpha > 0.0);
+    let is_pane = matches!(material.kind, MaterialKind::ThinDielectric { alpha: 0.0, .. });
+    let is_rough_glass = matches!(
+        material.kind,
+        MaterialKind::Dielectric { alpha, .. } | MaterialKind::ThinDielectric { alpha, .. } if alpha > 0.0
+    );
     let is_opaque =
         surface.opacity.factor >= 1.0 && surface.opacity.texture.is_none() && !surface.vertex_color;
     let is_tinted = surface.color.is_some() || surface.vertex_color;

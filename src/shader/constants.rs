@@ -246,8 +246,11 @@ constants! {
     MATERIAL_COATED = 9;
     /// Metallic-roughness material below a sheen.
     MATERIAL_SHEEN = 10;
+    /// Thin pane whose surfaces are rough.
+    MATERIAL_ROUGH_PANE = 11;
     /// Bits `1 << kind` of the specular kinds, at which no sampler draws light.
-    SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC;
+    SPECULAR_KINDS = 1 << MATERIAL_MIRROR | 1 << MATERIAL_DIELECTRIC | 1 << MATERIAL_THIN_DIELECTRIC
+        | 1 << MATERIAL_ROUGH_PANE;
 
     // Lamps.
     /// Marks a lamp without a surface in [`LampChoice::source`](super::structs::LampChoice::source).

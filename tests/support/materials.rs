@@ -236,11 +236,17 @@ pub fn specular_materials() -> Vec<Material> {
             transmittance: tint,
             absorption: 2.0 * tint,
         },
-        MaterialKind::ThinDielectric { ior: 1.5, reflectance: Vec3::ONE, transmittance: tint },
+        MaterialKind::pane(1.5, tint),
     ];
     let glass = beckmann(case("specular", 0.4, MaterialKind::glass(1.5, 0.4)));
     let all = kinds.map(|kind| Material::new("specular", kind)).into_iter();
-    all.chain([glass.material]).collect()
+    let pane = MaterialKind::ThinDielectric {
+        ior: 1.5,
+        alpha: 0.3,
+        reflectance: Vec3::ONE,
+        transmittance: tint,
+    };
+    all.chain([glass.material, Material::new("rough pane", pane)]).collect()
 }
 
 /// Returns the device's materials of [`specular_materials`].

@@ -287,11 +287,7 @@ pub fn glazed_room() -> Scene {
         transmittance: Vec3::splat(0.9),
         absorption: Vec3::new(2.0, 0.5, 1.0),
     };
-    let pane = MaterialKind::ThinDielectric {
-        ior: 1.5,
-        reflectance: Vec3::ONE,
-        transmittance: Vec3::new(0.8, 0.9, 0.85),
-    };
+    let pane = MaterialKind::pane(1.5, Vec3::new(0.8, 0.9, 0.85));
     let paint = materials::principled(Vec3::new(0.7, 0.4, 0.3), 0.3, 0.5);
     let mut glowing = Material::new("paint", paint);
     let radiance = Vec3::new(6.0, 4.0, 2.0);

@@ -173,7 +173,7 @@ pub fn brdf_sample(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
         MATERIAL_MEASURED => {
             return measured_sample(brdf_table, material.table_offset, outgoing_local, u);
         }
-        MATERIAL_MIRROR | MATERIAL_DIELECTRIC | MATERIAL_THIN_DIELECTRIC => {
+        MATERIAL_MIRROR | MATERIAL_DIELECTRIC | MATERIAL_THIN_DIELECTRIC | MATERIAL_ROUGH_PANE => {
             return vec3(0.0, 0.0, -1.0);
         }
         MATERIAL_DIFFUSE | MATERIAL_DIFFUSE_TRANSMISSION => 0.0,
@@ -241,7 +241,7 @@ pub fn brdf_albedo(brdf_table: &[u32], material: &Material, outgoing_local: Vec3
             let fresnel = fresnel_interface(cosine.abs(), material.ior);
             mix_vec3(material.eta.into(), reflectance, fresnel)
         }
-        MATERIAL_THIN_DIELECTRIC => {
+        MATERIAL_THIN_DIELECTRIC | MATERIAL_ROUGH_PANE => {
             pane_reflectance(material, cosine) + pane_transmittance(material, cosine)
         }
         MATERIAL_CONDUCTOR | MATERIAL_MEASURED => {

@@ -51,9 +51,27 @@ pub struct Scatter {
     pub is_transmitted: bool,
 }
 
-/// Refractive index of the side that the viewer does not see over that of the viewer's.
-fn relative_index(material: &Material, is_back: bool) -> f32 {
-    if is_back { 1.0 / material.ior } else { material.ior }
+/// Refractive index of the side that the viewer does not see over that of the viewer's; 1 beyond a pane.
+pub fn relative_index(material: &Material, is_back: bool) -> f32 {
+    match (material.kind, is_back) {
+        (MATERIAL_ROUGH_PANE, _) => 1.0,
+        (_, true) => 1.0 / material.ior,
+        (_, false) => material.ior,
+    }
+}
+
+/// Light that an interface or a pane reflects at a cosine with the normal of a microfacet.
+fn facet_reflectance(material: &Material, cosine: f32, eta: f32) -> f32 {
+    if material.kind == MATERIAL_ROUGH_PANE {
+        let once = fresnel_interface(cosine.abs(), material.ior);
+        return 2.0 * once / (1.0 + once);
+    }
+    fresnel_interface(cosine, eta)
+}
+
+/// Mirrors a direction at the surface.
+fn mirrored(direction: Vec3) -> Vec3 {
+    vec3(direction.x, direction.y, -direction.z)
 }
 
 /// Probability of reflection: its part of all light by luminance.
@@ -83,19 +101,18 @@ fn dielectric_scatter(
         normal = ggx_normal_sample(outgoing_local, width, 1.0, vec2(u.y, u.z));
     }
     let cosine = outgoing_local.dot(normal);
-    let fresnel = fresnel_interface(cosine, eta);
+    let fresnel = facet_reflectance(material, cosine, eta);
     let probability = reflection_probability(material, fresnel);
     let is_transmitted = u.x >= probability;
+    let reflected = 2.0 * cosine * normal - outgoing_local;
     let (direction_local, mut weight) = if is_transmitted {
+        let is_pane = material.kind == MATERIAL_ROUGH_PANE;
         (
-            refracted(outgoing_local, normal, eta),
+            if is_pane { mirrored(reflected) } else { refracted(outgoing_local, normal, eta) },
             (1.0 - fresnel) / ((1.0 - probability) * eta * eta) * Vec3::from(material.eta),
         )
     } else {
-        (
-            2.0 * cosine * normal - outgoing_local,
-            fresnel / probability * Vec3::from(material.reflectance),
-        )
+        (reflected, fresnel / probability * Vec3::from(material.reflectance))
     };
     if material.alpha > 0.0 {
         weight *= visible_normal_ratio(normal, outgoing_local, direction_local, width);
@@ -119,28 +136,34 @@ pub fn dielectric_evaluate_and_pdf(
     }
     let eta = relative_index(material, is_back);
     let is_transmitted = incident_local.z < 0.0;
-    let half_vector = outgoing_local + (if is_transmitted { eta } else { 1.0 }) * incident_local;
+    let is_refracted = is_transmitted && material.kind != MATERIAL_ROUGH_PANE;
+    let facing =
+        if is_transmitted && !is_refracted { mirrored(incident_local) } else { incident_local };
+    let half_vector = outgoing_local + (if is_refracted { eta } else { 1.0 }) * facing;
     let normal = (if half_vector.z < 0.0 { -half_vector } else { half_vector }).normalize();
     let cosine = outgoing_local.dot(normal);
-    let incident_cosine = incident_local.dot(normal);
-    if cosine <= 0.0 || (incident_cosine < 0.0) != is_transmitted {
+    let incident_cosine = facing.dot(normal);
+    if cosine <= 0.0 || (incident_cosine < 0.0) != is_refracted {
         return (Vec3::ZERO, 0.0);
     }
-    let fresnel = fresnel_interface(cosine, eta);
+    let fresnel = facet_reflectance(material, cosine, eta);
     let probability = reflection_probability(material, fresnel);
     let width = GgxWidth::of(material);
     let density = ggx_visible_density(normal, outgoing_local, width);
     // G₂·D / (cos o · cos i), by the density of visible normals.
     let ratio = visible_normal_ratio(normal, outgoing_local, incident_local, width) * density
         / incident_local.z.abs();
-    if is_transmitted {
-        let jacobian = cosine * incident_cosine.abs() / half_vector.dot(half_vector);
-        let value = (1.0 - fresnel) * ratio * jacobian * Vec3::from(material.eta);
-        (value, (1.0 - probability) * density * jacobian * eta * eta)
+    let (jacobian, scale) = if is_refracted {
+        (cosine * incident_cosine.abs() / half_vector.dot(half_vector), eta * eta)
     } else {
-        let value = 0.25 * fresnel * ratio * Vec3::from(material.reflectance);
-        (value, 0.25 * probability * density)
-    }
+        (0.25, 1.0)
+    };
+    let (share, color, chance) = if is_transmitted {
+        (1.0 - fresnel, material.eta, 1.0 - probability)
+    } else {
+        (fresnel, material.reflectance, probability)
+    };
+    (share * ratio * jacobian * Vec3::from(color), chance * density * jacobian * scale)
 }
 
 /// Share that is left of light which reaches a surface over `distance`: a viewer at the back of a dielectric
@@ -182,7 +205,8 @@ pub fn scatter(material: &Material, outgoing_local: Vec3, is_back: bool, u: Vec3
             is_transmitted: false,
         };
     }
-    if outgoing_local.z > 0.0 && material.kind == MATERIAL_DIELECTRIC {
+    if outgoing_local.z > 0.0 && matches!(material.kind, MATERIAL_DIELECTRIC | MATERIAL_ROUGH_PANE)
+    {
         return dielectric_scatter(material, outgoing_local, is_back, u);
     }
     if outgoing_local.z > 0.0 && material.kind == MATERIAL_THIN_DIELECTRIC {

@@ -44,7 +44,6 @@ features! {
     GLTF_SPECULAR_TEXTURE "textures of `KHR_materials_specular`" "their means";
     GLTF_LOW_TRANSMISSION "transmission of less than half the light" "the surface is opaque";
     GLTF_TRANSMISSION_TEXTURE "texture of transmission" "a triangle is glass or opaque by its mean there";
-    GLTF_THIN_ROUGHNESS "roughness of thin glass" "a pane is smooth";
     GLTF_GLOSSINESS_TEXTURE
         "specular texture of `KHR_materials_pbrSpecularGlossiness` on other coordinates than the diffuse one"
         "its mean colour counts; its glossiness is read";

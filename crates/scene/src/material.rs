@@ -248,6 +248,11 @@ impl MaterialKind {
         Self::Dielectric { ior, alpha, reflectance, transmittance, absorption: Vec3::ZERO }
     }
 
+    /// Makes a smooth pane of clear surfaces.
+    pub fn pane(ior: f32, transmittance: Vec3) -> Self {
+        Self::ThinDielectric { ior, alpha: 0.0, reflectance: Vec3::ONE, transmittance }
+    }
+
     /// Name in scene files, number in hashes, and the parameters in groups; the table of a measured one is
     /// not among them.
     pub fn parameters(&self) -> (&'static str, u32, Vec<Vec<f32>>) {
@@ -284,9 +289,10 @@ impl MaterialKind {
                 let factors = colors(&[reflectance, transmittance, absorption]);
                 ("dielectric", 7, vec![vec![*ior, *alpha], factors])
             }
-            Self::ThinDielectric { ior, reflectance, transmittance } => {
-                let factors = colors(&[reflectance, transmittance]);
-                ("thin_dielectric", 8, vec![vec![*ior], factors])
+            Self::ThinDielectric { ior, alpha, reflectance, transmittance } => {
+                let mut groups = vec![vec![*ior], colors(&[reflectance, transmittance])];
+                groups.extend((*alpha > 0.0).then(|| vec![*alpha]));
+                ("thin_dielectric", 8, groups)
             }
             Self::DiffuseTransmission { reflectance, transmittance } => {
                 ("diffuse_transmission", 9, vec![colors(&[reflectance, transmittance])])
@@ -466,10 +472,12 @@ pub enum MaterialKind {
         absorption: Vec3,
     },
     /// Thin pane of a dielectric: reflects as a mirror or lets light straight through, with all
-    /// reflections between its two sides.
+    /// reflections between its two sides; a rough one scatters what it lets through as what it reflects.
     ThinDielectric {
         /// Refractive index.
         ior: f32,
+        /// GGX width α; 0 is smooth.
+        alpha: f32,
         /// Factor of the reflected light, 0…1.
         reflectance: Vec3,
         /// Factor of the transmitted light, 0…1.

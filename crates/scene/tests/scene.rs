@@ -577,6 +577,7 @@ fn materials_take_textures_opacity_and_emission() {
         [[material]]
         name = \"pane\"
         type = \"thin_dielectric\"
+        alpha = 0.0625
         transmittance = {{ texture = \"wood.png\", factor = [0.9, 0.8, 0.7] }}
         [[material]]
         name = \"silver\"
@@ -628,8 +629,10 @@ fn materials_take_textures_opacity_and_emission() {
     assert!(matches!(frosted.kind, MaterialKind::Dielectric { alpha: 0.25, transmittance, .. }
         if transmittance == Vec3::new(0.5, 0.6, 0.7)));
     assert_eq!(frosted.kind.absorption(), Some(Vec3::new(1.0, 0.0, 20.0)));
-    let MaterialKind::ThinDielectric { ior, transmittance, .. } = pane.kind else { unreachable!() };
-    assert_eq!((ior, transmittance), (1.5, Vec3::new(0.9, 0.8, 0.7)));
+    let MaterialKind::ThinDielectric { ior, alpha, transmittance, .. } = pane.kind else {
+        unreachable!()
+    };
+    assert_eq!((ior, alpha, transmittance), (1.5, 0.0625, Vec3::new(0.9, 0.8, 0.7)));
     assert_eq!(pane.surface.color.as_ref().unwrap().encoding, Encoding::Srgb);
     assert_eq!(steel.surface.distribution, Distribution::Beckmann);
     assert!(matches!(silver.kind, MaterialKind::Mirror { reflectance: Vec3::ONE }));

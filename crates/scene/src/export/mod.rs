@@ -112,7 +112,8 @@ fn has_media(scene: &Scene) -> bool {
 
 /// Tests for panes, which the light of lamps goes straight through.
 fn has_panes(scene: &Scene) -> bool {
-    let is_pane = |kind: &MaterialKind| matches!(kind, MaterialKind::ThinDielectric { .. });
+    let is_pane =
+        |kind: &MaterialKind| matches!(kind, MaterialKind::ThinDielectric { alpha: 0.0, .. });
     scene.materials.iter().any(|material| is_pane(&material.kind))
 }
 

@@ -78,6 +78,13 @@ impl<'a> Subject<'a> {
         }
     }
 
+    /// Names a rough pane, for formats whose panes are smooth.
+    pub(super) fn without_rough_pane(&mut self) {
+        if !matches!(self.material.kind, MaterialKind::ThinDielectric { alpha: 0.0, .. }) {
+            self.warn("its rough pane becomes a smooth one");
+        }
+    }
+
     /// Names normals of Beckmann's, for formats and models that have none.
     pub(super) fn without_beckmann(&mut self) {
         if self.surface.distribution == Distribution::Beckmann {

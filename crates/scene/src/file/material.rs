@@ -187,9 +187,9 @@ pub(crate) struct DielectricEntry {
     /// Refractive index of the inside over that of the outside, 0.2…5.
     #[serde(default = "default_ior")]
     pub ior: f32,
-    /// GGX width α, 0.001…1, or 0 for a smooth surface; this or `roughness`. Default: 0.
+    /// GGX width α, 0.001…1, or 0; this or `roughness`. Default: 0.
     pub alpha: Option<f32>,
-    /// √α, one number.
+    /// √α.
     pub roughness: Option<Textured<f32>>,
     /// Factor of the reflected light, 0…1.
     #[serde(default = "default_factor")]
@@ -208,6 +208,10 @@ pub(crate) struct ThinDielectricEntry {
     /// Refractive index, 1…4.
     #[serde(default = "default_ior")]
     pub ior: f32,
+    /// GGX width α, 0.001…1, or 0; this or `roughness`. Default: 0.
+    pub alpha: Option<f32>,
+    /// √α.
+    pub roughness: Option<Textured<f32>>,
     /// Factor of the reflected light, 0…1.
     #[serde(default = "default_factor")]
     pub reflectance: [f32; 3],

@@ -236,17 +236,12 @@ impl Reader<'_> {
                 let ior = entry.ior;
                 self.check_range("ior", &[ior], (0.2, 5.0))?;
                 let absorption = self.vector("absorption", entry.absorption, (0.0, 1e6))?;
-                let is_smooth = entry.alpha.unwrap_or(0.0) == 0.0 && entry.roughness.is_none();
-                let alpha = if is_smooth {
-                    0.0
-                } else {
-                    let message = format!(
-                        "ior: a rough dielectric of index {ior} bends no light; expected an index at \
-                         least 0.01 from 1, or no roughness"
-                    );
-                    self.check((ior - 1.0).abs() >= 0.01, &message)?;
-                    self.alpha(Some("dielectric"), entry.alpha, &entry.roughness)?
-                };
+                let alpha = self.glass_alpha("dielectric", entry.alpha, &entry.roughness)?;
+                let message = format!(
+                    "ior: a rough dielectric of index {ior} bends no light; expected an index at least \
+                     0.01 from 1, or no roughness"
+                );
+                self.check(alpha == 0.0 || (ior - 1.0).abs() >= 0.01, &message)?;
                 MaterialKind::Dielectric {
                     ior,
                     alpha,
@@ -259,6 +254,7 @@ impl Reader<'_> {
                 self.check_range("ior", &[entry.ior], (1.0, 4.0))?;
                 MaterialKind::ThinDielectric {
                     ior: entry.ior,
+                    alpha: self.glass_alpha("thin_dielectric", entry.alpha, &entry.roughness)?,
                     reflectance: self.vector("reflectance", entry.reflectance, SHARE)?,
                     transmittance: self.share("transmittance", &entry.transmittance)?,
                 }
@@ -317,6 +313,17 @@ impl Reader<'_> {
         let message = format!("{key}.factor: expected one number, found {found:?}");
         self.check(factor == green && green == blue, &message)?;
         Ok((factor, Some(self.texture_use(key, entry, Encoding::Linear)?)))
+    }
+
+    /// The width of glass, 0 where it is smooth.
+    fn glass_alpha(
+        &mut self,
+        kind: &str,
+        alpha: Option<f32>,
+        roughness: &Option<Textured<f32>>,
+    ) -> Result<f32> {
+        let is_smooth = alpha.unwrap_or(0.0) == 0.0 && roughness.is_none();
+        if is_smooth { Ok(0.0) } else { self.alpha(Some(kind), alpha, roughness) }
     }
 
     /// Reads a GGX width. The tables of the kind `tabulated` are made for one roughness.

@@ -403,7 +403,9 @@ impl Reader {
                     let absorption = Vec3::ZERO;
                     MaterialKind::Dielectric { ior, alpha, reflectance, transmittance, absorption }
                 }
-                None => MaterialKind::ThinDielectric { ior, reflectance, transmittance },
+                None => {
+                    MaterialKind::ThinDielectric { ior, alpha: 0.0, reflectance, transmittance }
+                }
             });
         model.surface.two_sided = true;
         Ok(model)

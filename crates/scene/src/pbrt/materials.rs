@@ -99,11 +99,9 @@ impl<'a> Materials<'a> {
                 let alpha = if roughness.alpha < SMOOTH_ALPHA { 0.0 } else { roughness.alpha };
                 MaterialKind::glass(self.ior(entity, "eta", DEFAULT_IOR, SOLID_IOR)?, alpha)
             }
-            "thindielectric" => MaterialKind::ThinDielectric {
-                ior: self.ior(entity, "eta", DEFAULT_IOR, SOLID_IOR)?,
-                reflectance: Vec3::ONE,
-                transmittance: Vec3::ONE,
-            },
+            "thindielectric" => {
+                MaterialKind::pane(self.ior(entity, "eta", DEFAULT_IOR, SOLID_IOR)?, Vec3::ONE)
+            }
             "diffusetransmission" => {
                 let scale = entity.number("scale", 1.0)? as f32;
                 let mut side = |name: &str| {

@@ -162,8 +162,8 @@ impl<'a> Translator<'a> {
                 self.extension("KHR_materials_volume", volume);
                 core
             }
-            MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
-                self.glass(*ior, 0.0, *reflectance, *transmittance)
+            MaterialKind::ThinDielectric { ior, alpha, reflectance, transmittance } => {
+                self.glass(*ior, alpha.sqrt(), *reflectance, *transmittance)
             }
             MaterialKind::Measured { path, table } => {
                 let share = self.subject.measured(path, table);

@@ -173,7 +173,8 @@ impl Translator<'_> {
                     element("dielectric", &glass)
                 }
             }
-            MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
+            MaterialKind::ThinDielectric { ior, reflectance, transmittance, .. } => {
+                self.subject.without_rough_pane();
                 element("thindielectric", &self.glass(*ior, *reflectance, *transmittance))
             }
             MaterialKind::Measured { path, table } => match table.rgl {

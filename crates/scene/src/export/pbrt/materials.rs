@@ -124,7 +124,8 @@ impl<'a> Translator<'a> {
                 self.colored_glass(*reflectance, *transmittance);
                 ("dielectric", float("eta", *ior) + &self.roughness(*alpha))
             }
-            MaterialKind::ThinDielectric { ior, reflectance, transmittance } => {
+            MaterialKind::ThinDielectric { ior, reflectance, transmittance, .. } => {
+                self.subject.without_rough_pane();
                 self.colored_glass(*reflectance, *transmittance);
                 ("thindielectric", float("eta", *ior))
             }

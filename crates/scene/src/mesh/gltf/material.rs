@@ -29,7 +29,7 @@ const VECTOR: (Channels, Encoding) = (Channels::Color, Encoding::Linear);
 const GLASS: f32 = 0.5;
 /// Share of light scattered through from which a surface is a sheet.
 const LEAST_TRANSMISSION: f32 = 1e-3;
-/// Roughness from which a thin pane, which is always smooth, is worth a warning.
+/// Roughness from which a thin pane is not smooth.
 const VISIBLE_ROUGHNESS: f32 = 0.05;
 /// Largest reflectance at normal incidence of a material that is read as a dielectric.
 const STRONGEST_DIELECTRIC: f32 = 0.08;
@@ -368,10 +368,11 @@ impl GltfReader<'_> {
                 absorption: (-attenuation.ln() / distance.max(1e-6)).max(Vec3::ZERO),
             }
         } else {
-            let rough = roughness * mean_number(&found.surface.roughness);
-            reading.ignore_if(rough > VISIBLE_ROUGHNESS, features::GLTF_THIN_ROUGHNESS);
-            found.surface.roughness = None;
-            MaterialKind::ThinDielectric { ior, reflectance, transmittance: tint }
+            // A smooth pane is nearly the same, and lets shadow rays through.
+            let rough = roughness * mean_number(&found.surface.roughness) > VISIBLE_ROUGHNESS;
+            found.surface.roughness = found.surface.roughness.take().filter(|_| rough);
+            let alpha = if rough { roughness * roughness } else { 0.0 };
+            MaterialKind::ThinDielectric { ior, alpha, reflectance, transmittance: tint }
         };
         Ok(())
     }

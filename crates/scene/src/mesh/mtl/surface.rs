@@ -121,7 +121,7 @@ impl LibraryMaterial {
             let tint = Vec3::ONE.lerp(diffuse, opacity);
             let tint = if surface.color.is_some() { Vec3::ONE } else { tint };
             let transmittance = self.filter.unwrap_or(tint);
-            MaterialKind::ThinDielectric { ior, reflectance: Vec3::ONE, transmittance }
+            MaterialKind::pane(ior, transmittance)
         } else if is_glossy && matches!(self.model, 3 | 5) && diffuse.max_element() <= BLACK {
             MaterialKind::Mirror { reflectance: self.specular }
         } else if is_glossy {
