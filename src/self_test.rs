@@ -166,18 +166,14 @@ impl Answers {
         let spare = zeroed("spare", 256)?;
         let path_buffers = [
             (bindings::RAYS, &rays),
-            (bindings::RAY_TEXELS, &rays),
             (bindings::HITS, &hits),
-            (bindings::HIT_TEXELS, &hits),
             (bindings::HIT_INSTANCES, &instances),
             (bindings::PATHS, &paths),
             (bindings::PATH_LISTS, &path_lists),
-            (bindings::PATH_LIST_TEXELS, &path_lists),
         ];
         let shadow_buffers = [
             (bindings::HIT_TEXELS, &starts),
             (bindings::SHADOW_RAYS, &shadow_rays),
-            (bindings::SHADOW_RAY_TEXELS, &shadow_rays),
             (bindings::VISIBILITY, &visibility),
         ];
         let own: Vec<_> = geometry.bound.iter().map(|(at, buffer)| (*at, buffer)).collect();

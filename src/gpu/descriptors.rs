@@ -42,7 +42,7 @@ pub struct DescriptorSet {
 }
 
 impl DescriptorSet {
-    /// Creates a set of `table` with `buffers` at their bindings.
+    /// Creates a set of `table` with `buffers` at their bindings, and where they are read as texels too.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if a call fails, [`Error::Device`] if a texel buffer has more texels than
@@ -59,13 +59,17 @@ impl DescriptorSet {
             table,
             device: Arc::clone(device),
         };
+        let is_free =
+            |again: &&Binding| !buffers.iter().any(|(other, _)| other.number == again.number);
         for (binding, buffer) in buffers {
             let buffer = buffer.borrow();
-            let view = match binding.kind {
-                Kind::One(_) | Kind::Array(_) => vk::BufferView::null(),
-                Kind::Texels(format) => set.view(buffer, format)?,
-            };
-            set.buffers.push((*binding, buffer.clone(), view));
+            for at in [binding].into_iter().chain(binding.again.iter().filter(is_free)) {
+                let view = match at.kind {
+                    Kind::One(_) | Kind::Array(_) => vk::BufferView::null(),
+                    Kind::Texels(format) => set.view(buffer, format)?,
+                };
+                set.buffers.push((*at, buffer.clone(), view));
+            }
         }
         Ok(set)
     }
@@ -123,10 +127,12 @@ impl DescriptorSet {
         buffers: &[(Binding, &Buffer)],
         spare: &Buffer,
     ) -> Result<Self> {
-        let is_free =
-            |binding: &&Binding| !buffers.iter().any(|(other, _)| other.number == binding.number);
+        let is_named = |binding: &Binding| {
+            buffers.iter().any(|(other, _)| other == binding || other.again.contains(binding))
+        };
         let mut all = buffers.to_vec();
-        all.extend(table.bindings.iter().filter(is_free).map(|binding| (*binding, spare)));
+        let free = table.bindings.iter().filter(|binding| !is_named(binding));
+        all.extend(free.map(|binding| (*binding, spare)));
         Self::new(device, table, &all)
     }
 

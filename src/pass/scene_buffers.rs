@@ -159,10 +159,8 @@ impl SceneBuffers {
             (bindings::TRIANGLE_OBJECTS, words("triangle objects", &mattes.triangle_objects)?),
             (bindings::INSTANCE_OBJECTS, words("instance objects", &mattes.instance_objects)?),
             (bindings::MATERIAL_IDENTIFIERS, words("material identifiers", &mattes.materials)?),
-            (bindings::MATERIALS, materials.clone()),
-            (bindings::MATERIAL_TEXELS, materials),
-            (bindings::BRDF_TABLE, brdf_table.clone()),
-            (bindings::BRDF_CELLS, brdf_table),
+            (bindings::MATERIALS, materials),
+            (bindings::BRDF_TABLE, brdf_table),
         ];
         bound.extend_from_slice(&geometry.bound);
         bound.extend(textures.bound);

@@ -121,23 +121,13 @@ pub(crate) fn sharing_set(
     let paths = u64::from(paths);
     let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
     let connections = paths * u64::from(cohort_pixels);
-    let first_vertices = make("first vertices", paths, size_of::<FirstVertex>())?;
-    let offers = make("offers", paths, size_of::<Offer>())?;
-    let offer_weights = make("offer weights", paths, size_of::<f32>())?;
-    let connections = make("connections", connections, size_of::<Connection>())?;
-    let seen = make("seen offers", paths, size_of::<[u32; 2]>())?;
     let bound = [
-        (sharing::FIRST_VERTICES, first_vertices.clone()),
-        (sharing::FIRST_VERTEX_TEXELS, first_vertices),
+        (sharing::FIRST_VERTICES, make("first vertices", paths, size_of::<FirstVertex>())?),
         (sharing::SECOND_VERTICES, make("second vertices", paths, size_of::<SecondVertex>())?),
-        (sharing::OFFERS, offers.clone()),
-        (sharing::OFFER_TEXELS, offers),
-        (sharing::OFFER_WEIGHTS, offer_weights.clone()),
-        (sharing::OFFER_WEIGHT_TEXELS, offer_weights),
-        (sharing::CONNECTIONS, connections.clone()),
-        (sharing::CONNECTION_TEXELS, connections),
-        (sharing::SEEN, seen.clone()),
-        (sharing::SEEN_TEXELS, seen),
+        (sharing::OFFERS, make("offers", paths, size_of::<Offer>())?),
+        (sharing::OFFER_WEIGHTS, make("offer weights", paths, size_of::<f32>())?),
+        (sharing::CONNECTIONS, make("connections", connections, size_of::<Connection>())?),
+        (sharing::SEEN, make("seen offers", paths, size_of::<[u32; 2]>())?),
     ];
     DescriptorSet::new(device, &SHARING, &bound)
 }

@@ -73,27 +73,19 @@ impl WaveBuffers {
         let groups = u64::from(demand.light_groups);
         let make = |name, count: u64, size: usize| Buffer::new(device, name, count * size as u64);
         let make_if = |is_needed, name, size| make(name, if is_needed { paths } else { 1 }, size);
-        let rays = make("rays", paths, size_of::<Ray>())?;
-        let hits = make("hits", paths, size_of::<Hit>())?;
-        let shadow_rays = make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?;
-        let path_lists = Buffer::new(device, "path lists", path_list_bytes(paths))?;
         let radiance_count = (groups * paths).max(1);
         let (words, colours) = (size_of::<u32>(), size_of::<[f32; 3]>());
         let [textured, instanced, by_place] =
             [SURFACES_TEXTURED, SURFACES_INSTANCED, SURFACES_LAMP_CELLS].map(|bit| of.has(bit));
         let bound = [
-            (wave::RAYS, rays.clone()),
-            (wave::RAY_TEXELS, rays),
-            (wave::HITS, hits.clone()),
-            (wave::HIT_TEXELS, hits),
-            (wave::SHADOW_RAYS, shadow_rays.clone()),
-            (wave::SHADOW_RAY_TEXELS, shadow_rays),
+            (wave::RAYS, make("rays", paths, size_of::<Ray>())?),
+            (wave::HITS, make("hits", paths, size_of::<Hit>())?),
+            (wave::SHADOW_RAYS, make("shadow rays", shadow_ray_count, size_of::<ShadowRay>())?),
             (wave::VISIBILITY, make("visibility", shadow_ray_count, words)?),
             (wave::PATHS, make("paths", paths, size_of::<PathState>())?),
             (wave::HIT_SURFACES, make_if(textured, "hit surfaces", size_of::<Surface>())?),
             (wave::HIT_INSTANCES, make_if(instanced, "hit instances", words)?),
-            (wave::PATH_LISTS, path_lists.clone()),
-            (wave::PATH_LIST_TEXELS, path_lists),
+            (wave::PATH_LISTS, Buffer::new(device, "path lists", path_list_bytes(paths))?),
             (wave::LAMP_LISTS, make_if(by_place, "lamp lists", words)?),
             (wave::FEATURES, make_if(demand.has_features, "features", size_of::<Feature>())?),
             (wave::GROUP_RADIANCE, make("group radiance", radiance_count, colours)?),

@@ -29,6 +29,8 @@ pub struct Binding {
     pub name: &'static str,
     /// Type of its elements.
     pub kind: Kind,
+    /// The same buffer as texels, if shaders read it so too.
+    pub again: &'static [Binding],
     /// One sentence for the documentation.
     pub about: &'static str,
 }
@@ -103,21 +105,33 @@ macro_rules! kind {
 }
 pub(crate) use kind;
 
-/// Declares the buffers of a table in descriptor set `$set`, which `$number` numbers by their names.
+/// Declares the buffers of a table in descriptor set `$set`, which `$number` numbers by their names. One that
+/// shaders read as texels too has a second name and a format.
 macro_rules! buffers {
-    ($set:expr, $number:path; $($(#[doc = $doc:literal])* $name:ident: $kind:ident $of:ident;)*) => {
+    ($set:expr, $number:path; $($(#[doc = $doc:literal])* $name:ident: $kind:ident $of:ident
+        $(, $again:ident $format:ident)?;)*) => {
         /// Names of the buffers, in the order of declaration.
-        pub const BUFFER_NAMES: &[&str] = &[$(stringify!($name)),*];
+        pub const BUFFER_NAMES: &[&str] = &[$(stringify!($name) $(, stringify!($again))?),*];
         /// Every buffer.
-        pub const BUFFERS: &[$crate::shader::bindings::Binding] = &[$($name),*];
+        pub const BUFFERS: &[$crate::shader::bindings::Binding] = &[$($name $(, $again)?),*];
         $($(#[doc = $doc])*
         pub const $name: $crate::shader::bindings::Binding = $crate::shader::bindings::Binding {
             set: $set,
             number: $number(stringify!($name)),
             name: stringify!($name),
             kind: $crate::shader::bindings::kind!($kind $of),
+            again: &[$($again)?],
             about: concat!($($doc),*),
-        };)*
+        };
+        $(#[doc = concat!("[`", stringify!($name), "`] as texels.")]
+        pub const $again: $crate::shader::bindings::Binding = $crate::shader::bindings::Binding {
+            set: $set,
+            number: $number(stringify!($again)),
+            name: stringify!($again),
+            kind: $crate::shader::bindings::kind!(texels $format),
+            again: &[],
+            about: concat!(stringify!($name), " as texels."),
+        };)?)*
     };
 }
 pub(crate) use buffers;
@@ -161,22 +175,18 @@ binding_tables! {
         TRIANGLES_2: texels Rgba32Uint;
         /// Fourth page of triangles.
         TRIANGLES_3: texels Rgba32Uint;
-        /// Cells of four halves of the BRDF tables: `brdf_table` again.
-        BRDF_CELLS: texels Rgba16Float;
         /// Material index of each triangle in BVH order.
         TRIANGLE_MATERIALS: array uint;
         /// Materials.
-        MATERIALS: array Material;
-        /// Words of the BRDF tables, addressed by offsets in the materials.
-        BRDF_TABLE: texels R32Float;
+        MATERIALS: array Material, MATERIAL_TEXELS Rgba32Uint;
+        /// Words of the BRDF tables, addressed by offsets in the materials; as texels, cells of four halves.
+        BRDF_TABLE: texels R32Float, BRDF_CELLS Rgba16Float;
         /// Radiance of each texel of the environment map, and its compensated luminance.
         ENVIRONMENT_TEXELS: texels Rgba32Float;
         /// Cumulative probability over the rows of cells of the environment map.
         ENVIRONMENT_ROWS: texels R32Float;
         /// Cumulative probability over the cells of each row.
         ENVIRONMENT_CELLS: texels R32Float;
-        /// Materials again, four texels each.
-        MATERIAL_TEXELS: texels Rgba32Uint;
         /// Alias table over lamps and emitting triangles.
         LAMP_CHOICES: array LampChoice;
         /// Lights without a surface.
@@ -225,56 +235,38 @@ binding_tables! {
     /// Set 1 of the passes by which pixels share paths.
     SHARING = sharing: 1 {
         /// First vertex of each path.
-        FIRST_VERTICES: array FirstVertex;
-        /// First vertices again, six texels each.
-        FIRST_VERTEX_TEXELS: texels Rgba32Uint;
+        FIRST_VERTICES: array FirstVertex, FIRST_VERTEX_TEXELS Rgba32Uint;
         /// Second vertex of each path.
         SECOND_VERTICES: array SecondVertex;
         /// Offer of each path to the pixels of its cohort.
-        OFFERS: array Offer;
-        /// Offers again, six texels each.
-        OFFER_TEXELS: texels Rgba32Uint;
+        OFFERS: array Offer, OFFER_TEXELS Rgba32Uint;
         /// Weight of each offer.
-        OFFER_WEIGHTS: array float;
-        /// Weights of offers again.
-        OFFER_WEIGHT_TEXELS: texels R32Float;
+        OFFER_WEIGHTS: array float, OFFER_WEIGHT_TEXELS R32Float;
         /// Connections of path `i` with the offer of pixel `k` of its cohort at `k · path_count + i`.
-        CONNECTIONS: array Connection;
-        /// Connections again, one texel each.
-        CONNECTION_TEXELS: texels Rgba32Float;
+        CONNECTIONS: array Connection, CONNECTION_TEXELS Rgba32Float;
         /// Bits of the pixels of the cohort whose offers each path sees.
-        SEEN: array uvec2;
-        /// These bits again.
-        SEEN_TEXELS: texels Rg32Uint;
+        SEEN: array uvec2, SEEN_TEXELS Rg32Uint;
     }
 
     /// Set 2: the wave in flight, rewritten by every pass.
     WAVE = wave: 2 {
         /// Next ray of each path.
-        RAYS: array Ray;
+        RAYS: array Ray, RAY_TEXELS Rgba32Uint;
         /// Hit of each path.
-        HITS: array Hit;
+        HITS: array Hit, HIT_TEXELS Rgba32Uint;
         /// Shadow rays: direction `k` of path `i` at `k · path_count + i`.
-        SHADOW_RAYS: array ShadowRay;
+        SHADOW_RAYS: array ShadowRay, SHADOW_RAY_TEXELS Rg32Uint;
         /// One where a shadow ray reaches the light, else zero.
         VISIBILITY: array uint;
         /// State of each path.
         PATHS: array PathState;
-        /// Rays again, two texels each.
-        RAY_TEXELS: texels Rgba32Uint;
-        /// Hits again, three texels each.
-        HIT_TEXELS: texels Rgba32Uint;
-        /// Shadow rays again, three texels each.
-        SHADOW_RAY_TEXELS: texels Rg32Uint;
         /// Surface at the hit of each path, in scenes with textures.
         HIT_SURFACES: array Surface;
         /// Instance that each path has hit, in scenes with instances.
         HIT_INSTANCES: array uint;
         /// Lengths of `PATH_LISTS` lists of paths, then the lists themselves: even and odd ones share a
         /// place each.
-        PATH_LISTS: array uint;
-        /// Lists of paths again.
-        PATH_LIST_TEXELS: texels R32Uint;
+        PATH_LISTS: array uint, PATH_LIST_TEXELS R32Uint;
         /// First entry of the list that lamps were drawn from at the last vertex of each path.
         LAMP_LISTS: array uint;
         /// Layers of surfaces of each path, where they are asked for.

@@ -120,19 +120,14 @@ impl NodeSize {
         let centres: Vec<[f32; 4]> = (0..1 << (2 * self.level))
             .map(|node| node_centre(self.level, node).extend(0.0).to_array())
             .collect();
-        let tree = Buffer::texels_from_slice(device, "environment tree", &tree.nodes)?;
-        let centres = Buffer::texels_from_slice(device, "node centres", &centres)?;
-        let nodes = Buffer::new(device, "product nodes", paths * self.quads() * 8)?;
-        let sums = Buffer::new(device, "node sums", paths * self.sums() * 16)?;
-        let cache = Buffer::new(device, "blocked directions", paths * self.cache_words() * 4)?;
+        let texels = |name, texels: &[_]| Buffer::texels_from_slice(device, name, texels);
+        let make = |name, bytes: u64| Buffer::new(device, name, paths * bytes);
         let bound = [
-            (haar::HAAR_TREE, &tree),
-            (haar::HAAR_CENTRES, &centres),
-            (haar::HAAR_NODES, &nodes),
-            (haar::HAAR_NODE_TEXELS, &nodes),
-            (haar::HAAR_SUMS, &sums),
-            (haar::HAAR_SUM_TEXELS, &sums),
-            (haar::HAAR_CACHE, &cache),
+            (haar::HAAR_TREE, texels("environment tree", &tree.nodes)?),
+            (haar::HAAR_CENTRES, texels("node centres", &centres)?),
+            (haar::HAAR_NODES, make("product nodes", self.quads() * 8)?),
+            (haar::HAAR_SUMS, make("node sums", self.sums() * 16)?),
+            (haar::HAAR_CACHE, make("blocked directions", self.cache_words() * 4)?),
         ];
         DescriptorSet::new(device, &haar::TABLE, &bound)
     }

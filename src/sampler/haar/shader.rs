@@ -14,14 +14,10 @@ room! {
         /// Direction to the centre of each node of the product.
         HAAR_CENTRES: texels Rgba32Float;
         /// Nodes of the product by fours, halves: quad `q` of path `i` at `q · path_count + i`.
-        HAAR_NODES: array uvec2;
-        /// Nodes of the product again.
-        HAAR_NODE_TEXELS: texels Rgba16Float;
+        HAAR_NODES: array uvec2, HAAR_NODE_TEXELS Rgba16Float;
         /// Sums of the weights below the children of each coarse node: node `n` of path `i` at
         /// `n · path_count + i`.
-        HAAR_SUMS: array vec4;
-        /// These sums again.
-        HAAR_SUM_TEXELS: texels Rgba32Float;
+        HAAR_SUMS: array vec4, HAAR_SUM_TEXELS Rgba32Float;
         /// Blocked directions: their number of path `i` at `i`, the `k`th at `k · path_count + i`.
         HAAR_CACHE: array uint;
     }

@@ -55,19 +55,14 @@ impl LobeBuffers {
         let caches = size.cached_pixels.unwrap_or(paths);
         let cache_words =
             if size.cache_capacity > 0 { 1 + u64::from(size.cache_capacity) } else { 0 };
-        let lobes = make("product lobes", paths * kept, 8)?;
-        let sums = make("lobe sums", paths * kept.div_ceil(u64::from(LOBES_PER_SUM)), 4)?;
-        let close_lobes = make("close lobes", paths * size.mask_words(), 4)?;
+        let sum_count = paths * kept.div_ceil(u64::from(LOBES_PER_SUM));
         let caches = Buffer::zeroed(device, "visibility caches", 4 * caches * cache_words)?;
         let mut bound = fits.bound.to_vec();
         bound.extend([
-            (product::LOBES, lobes.clone()),
-            (product::LOBE_TEXELS, lobes),
+            (product::LOBES, make("product lobes", paths * kept, 8)?),
             (product::LOBE_COUNTS, make("lobe counts", paths, 4)?),
-            (product::LOBE_SUMS, sums.clone()),
-            (product::LOBE_SUM_TEXELS, sums),
-            (product::CLOSE_LOBES, close_lobes.clone()),
-            (product::CLOSE_LOBE_TEXELS, close_lobes),
+            (product::LOBE_SUMS, make("lobe sums", sum_count, 4)?),
+            (product::CLOSE_LOBES, make("close lobes", paths * size.mask_words(), 4)?),
             (product::VISIBILITY_CACHE, caches),
         ]);
         let set = DescriptorSet::new(device, &product::TABLE, &bound)?;

@@ -39,20 +39,14 @@ room! {
         /// First lobe of each material, and its lobes per view.
         MATERIAL_LOBES: texels Rg32Uint;
         /// Lobes of the product: lobe `l` of path `i` at `l · path_count + i`.
-        LOBES: array uvec2;
-        /// Lobes of the product again.
-        LOBE_TEXELS: texels Rg32Uint;
+        LOBES: array uvec2, LOBE_TEXELS Rg32Uint;
         /// Number of lobes of each path.
         LOBE_COUNTS: array uint;
         /// Sums of the current weights up to every `LOBES_PER_SUM`th lobe of a path and to the
         /// last: sum `s` of path `i` at `s · path_count + i`.
-        LOBE_SUMS: array float;
-        /// Sums of weights again.
-        LOBE_SUM_TEXELS: texels R32Float;
+        LOBE_SUMS: array float, LOBE_SUM_TEXELS R32Float;
         /// Bits of the lobes close to each cached direction (`close_lobes_index`).
-        CLOSE_LOBES: array uint;
-        /// Bits of close lobes again.
-        CLOSE_LOBE_TEXELS: texels R32Uint;
+        CLOSE_LOBES: array uint, CLOSE_LOBE_TEXELS R32Uint;
         /// Visibility caches by path or by film pixel: a head and `CACHE_CAPACITY` directions each.
         VISIBILITY_CACHE: array uint;
     }
