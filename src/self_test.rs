@@ -66,9 +66,6 @@ pub(crate) fn refusal(capabilities: &Capabilities, fault: &str) -> Error {
 }
 
 /// Runs the test and lists what is wrong.
-///
-/// # Errors
-/// The device fails or memory runs out.
 pub(crate) fn faults(device: &Arc<Device>) -> Result<Vec<String>> {
     let accel = Accel::build(&scene(), triangle_page_bytes(device.capabilities()))?;
     Ok(judge(&Answers::of_host(&accel), &Answers::of_device(device, &accel)?))

@@ -19,10 +19,8 @@ pub(crate) struct Denoised {
     pub line: String,
 }
 
-/// Denoises the picture of `film`, read from or meant for `path`, which stays as it is.
-///
-/// # Errors
-/// An image without a picture, or one that is denoised already; the library's own.
+/// Denoises the picture of `film`, read from or meant for `path`, which stays as it is. Fails without a
+/// picture, if it is denoised already, or if the library does.
 pub(super) fn denoise(denoiser: &Denoiser, film: &Image, path: &Path) -> Result<Denoised> {
     check_film(film, path)?;
     let start = Instant::now();

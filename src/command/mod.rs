@@ -51,10 +51,7 @@ fn block_signals() -> nix::Result<()> {
 }
 
 /// Blocks signals, then starts the worker threads. Where the system allows no more threads, returns a
-/// pool that makes the calling thread do all work as long as it lives.
-///
-/// # Errors
-/// A pool of one thread cannot be made either.
+/// pool that makes the calling thread do all work as long as it lives. Fails if that cannot be made either.
 pub(crate) fn start_threads() -> Result<Option<ThreadPool>> {
     #[cfg(unix)]
     if let Err(error) = block_signals() {
@@ -79,10 +76,8 @@ pub fn set_program(program: Vec<String>) {
     PROGRAM.set(program).ok();
 }
 
-/// Returns a command that runs this program in a process of its own.
-///
-/// # Errors
-/// The system does not say where the program lies.
+/// Returns a command that runs this program in a process of its own. Fails if the system does not say where
+/// it lies.
 pub(crate) fn own_program() -> std::io::Result<Command> {
     let Some([program, arguments @ ..]) = PROGRAM.get().map(Vec::as_slice) else {
         return env::current_exe().map(Command::new);
@@ -93,9 +88,6 @@ pub(crate) fn own_program() -> std::io::Result<Command> {
 }
 
 /// Writes `text` and a line break to standard output. A closed pipe (`| head`) is not an error.
-///
-/// # Errors
-/// Standard output cannot be written.
 pub(crate) fn print_line(text: &str) -> Result<()> {
     let mut output = std::io::stdout().lock();
     match writeln!(output, "{}", escaped(text)).and_then(|()| output.flush()) {

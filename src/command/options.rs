@@ -43,10 +43,7 @@ pub struct DeviceOptions {
 }
 
 impl DeviceOptions {
-    /// Opens the device, once it has passed the self-test.
-    ///
-    /// # Errors
-    /// As [`Device::open_traced`], and a device that fails the test.
+    /// Opens the device, once it has passed the self-test. Fails as [`Device::open_traced`] and the test do.
     pub(crate) fn open(&self, validate: bool) -> Result<Arc<Device>> {
         Device::open_checked(self.device.as_deref(), validate, self.tracer, None, self_test::check)
     }
@@ -97,10 +94,8 @@ pub struct SceneOptions {
 }
 
 impl SceneOptions {
-    /// Loads a scene and logs its warnings.
-    ///
-    /// # Errors
-    /// As [`Scene::load_with`]; [`Error::Scene`] for any warning under `--strict`.
+    /// Loads a scene and logs its warnings. Fails as [`Scene::load_with`], and under `--strict` for any
+    /// warning.
     pub(crate) fn load(&self, path: &Path) -> Result<Scene> {
         let scene = self.load_at(path, None)?;
         scene.warnings.iter().for_each(|warning| log::warn!("{warning}"));
@@ -108,9 +103,6 @@ impl SceneOptions {
     }
 
     /// Loads a scene at a time of its animation, seconds, and leaves its warnings to the caller.
-    ///
-    /// # Errors
-    /// As [`SceneOptions::load`].
     pub(crate) fn load_at(&self, path: &Path, time: Option<f64>) -> Result<Scene> {
         let scene = Scene::load_with(
             path,

@@ -70,10 +70,8 @@ pub(crate) fn announce(device: &Device) {
     }
 }
 
-/// Tests a device unless it has passed before, with the same driver and settings.
-///
-/// # Errors
-/// [`crate::Error::Device`] if it fails. A test that cannot run says nothing about the device.
+/// Tests a device unless it has passed before, with the same driver and settings. Fails with
+/// [`crate::Error::Device`] if it does not pass. A test that cannot run says nothing about the device.
 pub(crate) fn check(capabilities: &Capabilities) -> Result<()> {
     let record = record(capabilities);
     if record.as_ref().is_some_and(|path| path.exists()) {

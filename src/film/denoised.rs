@@ -61,10 +61,8 @@ pub(crate) fn repair(pixels: &mut [[f32; 3]], width: u32) -> usize {
     bad.len()
 }
 
-/// Makes the image of a denoised picture: the window and the attributes of `film`, and the mark.
-///
-/// # Panics
-/// `pixels` is not as many as those of `film`.
+/// Makes the image of a denoised picture: the window and the attributes of `film`, and the mark. Panics if
+/// `pixels` are not as many as those of `film`.
 pub(crate) fn image_of(film: &Image, pixels: &[[f32; 3]], denoiser: String) -> Image {
     let mut image = Image {
         channels: std::collections::BTreeMap::new(),

@@ -30,10 +30,8 @@ pub(crate) fn preview(picture: &RgbImage, exposure: f32) -> Vec<[u8; 3]> {
     Tone { exposure, ..Tone::default() }.shown(picture)
 }
 
-/// Writes rows of display values as PNG. Fails with [`crate::Error::Io`] and the cause.
-///
-/// # Panics
-/// `pixels` are not whole rows.
+/// Writes rows of display values as PNG. Fails with [`crate::Error::Io`] and the cause. Panics if `pixels`
+/// are not whole rows.
 pub(crate) fn write_png(path: &Path, width: u32, pixels: &[[u8; 3]]) -> Result<()> {
     write_atomically(path, |file| encode_png(file, width, pixels))
 }

@@ -56,10 +56,8 @@ impl Packet {
         }
     }
 
-    /// Adds the segment from just beyond `origin` to `farthest`, whose answer belongs at `place`.
-    ///
-    /// # Panics
-    /// The packet is full.
+    /// Adds the segment from just beyond `origin` to `farthest`, whose answer belongs at `place`. Panics if
+    /// the packet is full.
     pub(crate) fn push(
         &mut self,
         place: u32,

@@ -118,14 +118,9 @@ unsafe impl Send for EmbreeScene {}
 unsafe impl Sync for EmbreeScene {}
 
 impl EmbreeScene {
-    /// Builds the tree.
-    ///
-    /// # Errors
-    /// [`crate::Error::Memory`] if memory does not suffice, [`crate::Error::Device`] if the library fails,
-    /// [`crate::Error::Vulkan`] if the host does not share the memory of a buffer.
-    ///
-    /// # Panics
-    /// If a triangle lies beyond its buffer.
+    /// Builds the tree. Fails with [`crate::Error::Memory`], with [`crate::Error::Device`] if the library
+    /// does, or with [`crate::Error::Vulkan`] if the host does not share the memory of a buffer. Panics if a
+    /// triangle lies beyond its buffer.
     pub(crate) fn new(embree: &Arc<Embree>, mut parts: Vec<Part>) -> Result<Self> {
         parts.retain(|part| !part.corners.is_empty());
         // SAFETY: the device is alive.

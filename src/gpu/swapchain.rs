@@ -191,13 +191,8 @@ impl Swapchain {
         Ok(())
     }
 
-    /// Shows the pixels of a buffer, four bytes each, row by row from the top.
-    ///
-    /// # Errors
-    /// [`Error::Vulkan`] if a call fails otherwise than by the states in [`Presented`].
-    ///
-    /// # Panics
-    /// If the buffer has fewer pixels than the images.
+    /// Shows the pixels of a buffer, four bytes each, row by row from the top. Fails if a call does otherwise
+    /// than by the states in [`Presented`]. Panics if the buffer has fewer pixels than the images.
     pub(crate) fn present(&mut self, pixels: &Buffer) -> Result<Presented> {
         let [width, height] = self.size;
         if self.images.is_empty() {

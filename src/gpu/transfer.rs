@@ -124,13 +124,8 @@ impl Buffer {
         Ok(result)
     }
 
-    /// Downloads the first `length` elements and passes them to `take` in order, piece by piece.
-    ///
-    /// # Errors
-    /// [`crate::Error::Vulkan`] if a call fails.
-    ///
-    /// # Panics
-    /// If the buffer is shorter, which is a bug in the caller.
+    /// Downloads the first `length` elements and passes them to `take` in order, piece by piece. Panics if
+    /// the buffer is shorter, which is a bug in the caller.
     pub(crate) fn download_pieces<T: Pod>(
         &self,
         length: usize,

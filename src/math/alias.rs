@@ -12,10 +12,8 @@ pub struct AliasEntry {
 /// Builds the alias table of `weights`, with thresholds in `0..=scale` (Walker 1977; Vose 1991).
 ///
 /// Thresholds are rounded: the table draws with [`probabilities`], not exactly in proportion to the
-/// weights. It never draws an index of weight 0. `None` if the weights sum to 0 or a subnormal.
-///
-/// # Panics
-/// Panics if a weight is negative or not finite: a mistake of the caller.
+/// weights. It never draws an index of weight 0. `None` if the weights sum to 0 or a subnormal. Panics if a
+/// weight is negative or not finite: a mistake of the caller.
 pub(crate) fn alias_table(weights: &[f64], scale: u64) -> Option<Vec<AliasEntry>> {
     assert!(
         weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0),

@@ -174,10 +174,7 @@ impl FilmBuffers {
     }
 
     /// Uses the buffers for a film of `size` pixels, or again for the whole one. The content means nothing
-    /// until [`FilmBuffers::clear`].
-    ///
-    /// # Panics
-    /// If a smaller film does not fit into the first page.
+    /// until [`FilmBuffers::clear`]. Panics if a smaller film does not fit into the first page.
     pub(crate) fn reshape(&mut self, [width, height]: [u32; 2]) {
         if [width, height] == [self.whole.width, self.whole.height] {
             (self.window, self.kept) = (self.whole, self.whole);

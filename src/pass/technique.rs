@@ -96,11 +96,8 @@ pub trait Technique: Passes + Any {
     }
 
     /// Continues from what an earlier render saved, without training. Returns true if the geometry
-    /// differs, so that most was forgotten.
-    ///
-    /// # Errors
-    /// [`Error::Format`] for other content; [`Error::Usage`] if it belongs to another scene, or if this
-    /// sampler learns nothing; [`Error::Vulkan`] if the device fails.
+    /// differs, so that most was forgotten. Fails with [`Error::Format`] for other content, with
+    /// [`Error::Usage`] if it belongs to another scene or if this sampler learns nothing.
     fn load(&mut self, _runner: &mut Runner, _: &Progress, saved: Saved<'_>) -> Result<bool> {
         let path = saved.path.display();
         Err(Error::usage(format!("{path}: this sampler learns nothing; expected --sampler guided")))
@@ -114,10 +111,8 @@ pub trait Technique: Passes + Any {
 
     /// Explains film pixel `at` by `rays` shadow rays in whole samples after those in the film, for
     /// techniques whose choices depend on the whole picture. Counts them for learning. `None` if no camera
-    /// ray hits anything, and for all other techniques. Fails if the device does.
-    ///
-    /// # Panics
-    /// If the pixel is outside the window.
+    /// ray hits anything, and for all other techniques. Fails if the device does. Panics if the pixel is
+    /// outside the window.
     fn explain_learned(
         &self,
         _runner: &mut Runner,

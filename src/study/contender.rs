@@ -44,10 +44,7 @@ impl Contender {
         Ok(Self { label: label.to_owned(), sampler, parameters })
     }
 
-    /// Parses a list without repeated labels.
-    ///
-    /// # Errors
-    /// As [`Contender::parse`], and for labels that occur twice or would share file names.
+    /// Parses a list without repeated labels. Fails for labels that occur twice or would share file names.
     pub(crate) fn parse_all(texts: &[impl AsRef<str>], defaults: Parameters) -> Result<Vec<Self>> {
         let mut contenders: Vec<Self> = Vec::new();
         for text in texts {

@@ -48,11 +48,8 @@ pub(crate) struct Results {
 /// Carries out `plan` in `folder`.
 ///
 /// `redo` removes finished runs made under other conditions; without it they are an error. The
-/// second value is the error that ended the study early; the results hold what was finished.
-///
-/// # Errors
-/// Anything that keeps the study from starting: an unusable scene or reference, runs made under
-/// other conditions.
+/// second value is the error that ended the study early; the results hold what was finished. Fails if it
+/// cannot start: an unusable scene or reference, runs made under other conditions.
 pub(crate) fn run(
     plan: &Plan,
     folder: &Folder,

@@ -108,19 +108,13 @@ impl Canvas {
     }
 
     /// Writes a PNG, atomically.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`] with the cause.
     pub(crate) fn write_png(&self, path: &Path) -> Result<()> {
         write_png(path, self.width as u32, &self.pixels)
     }
 }
 
 /// Draws `values` in false colour above a legend with numbers at both ends and in the middle. A map
-/// narrower than the legend is centred on white.
-///
-/// # Panics
-/// `values` is not a whole number of rows of `width`.
+/// narrower than the legend is centred on white. Panics if `values` is not a whole number of rows of `width`.
 pub(crate) fn picture(values: &[f64], width: usize, scale: Scale) -> Canvas {
     assert!(width > 0 && values.len().is_multiple_of(width), "whole rows of {width} values");
     let height = values.len() / width;

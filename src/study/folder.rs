@@ -45,11 +45,8 @@ struct Mark {
 
 impl Folder {
     /// Opens a report folder, creating one where the folder is absent or empty, and locks it
-    /// against other studies.
-    ///
-    /// # Errors
-    /// [`Error::Format`] if `path` holds something else; [`Error::Io`] if it cannot be written;
-    /// [`Error::Usage`] if another study is at work in it.
+    /// against other studies. Fails if `path` holds something else, cannot be written, or if another study is
+    /// at work in it.
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let folder = Self { path: path.to_path_buf(), _lock: None };
         let mark = path.join(MARK);
@@ -103,10 +100,7 @@ impl Folder {
         }
     }
 
-    /// Opens the folder of another study for reading.
-    ///
-    /// # Errors
-    /// [`Error::Format`] if it is no report folder.
+    /// Opens the folder of another study for reading. Fails with [`Error::Format`] if it is no report folder.
     pub(crate) fn existing(path: &Path) -> Result<Self> {
         if path.join(MARK).exists() {
             Ok(Self { path: path.to_path_buf(), _lock: None })
@@ -116,9 +110,6 @@ impl Folder {
     }
 
     /// Checks that no input lies in the folder.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] if one does.
     pub(crate) fn check_replaces_nothing(&self, inputs: &[&Path]) -> Result<()> {
         check_replaces_nothing_in("the report in", &self.path, inputs)
     }
@@ -141,10 +132,8 @@ impl Folder {
         self.path.join(Self::image_name(scene, stem))
     }
 
-    /// Reads such a file, or `None` if there is no such file.
-    ///
-    /// # Errors
-    /// [`Error::Io`], or [`Error::Format`] if the file holds something else.
+    /// Reads such a file, or `None` if there is no such file. Fails with [`Error::Format`] if it holds
+    /// something else.
     pub(crate) fn read_json<T: DeserializeOwned>(&self, path: &Path) -> Result<Option<T>> {
         let text = match fs::read_to_string(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),

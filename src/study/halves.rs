@@ -58,10 +58,7 @@ impl Study<'_> {
     }
 
     /// Renders what the folder lacks of the two halves and reads both. An interrupted half continues
-    /// from its checkpoint.
-    ///
-    /// # Errors
-    /// [`Error::Interrupted`] after the checkpoint has been written; a failing device or disk.
+    /// from its checkpoint. Fails with [`Error::Interrupted`] after the checkpoint has been written.
     fn render_reference(
         &mut self,
         scene: &Scene,
@@ -159,9 +156,6 @@ impl Study<'_> {
     }
 
     /// Renders both halves of the check unless the folder holds them, and compares.
-    ///
-    /// # Errors
-    /// [`Error::Interrupted`]; a failing device or disk.
     fn render_check(
         &mut self,
         scene: &Scene,

@@ -24,9 +24,6 @@ use crate::{
 
 impl Study<'_> {
     /// Measures the rounds of a scene that the folder lacks and appends all to `rounds`.
-    ///
-    /// # Errors
-    /// [`crate::Error::Interrupted`]; a failing device or disk.
     pub(super) fn measure_overhead(
         &mut self,
         plan: &OverheadPlan,

@@ -156,9 +156,6 @@ pub enum CheckPlan {
 
 impl CheckPlan {
     /// Parses `off`, `auto`, an EXR file (relative to `folder`) or a sampler with parameters.
-    ///
-    /// # Errors
-    /// As [`Contender::parse`].
     pub(crate) fn parse(text: &str, folder: &Path, defaults: Parameters) -> Result<Self> {
         Ok(match text.trim() {
             "off" => Self::Off,

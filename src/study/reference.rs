@@ -40,9 +40,6 @@ pub(crate) struct Reference {
 }
 
 /// Describes a reference for the records of runs, so that different ones can be told apart.
-///
-/// # Errors
-/// [`Error::Io`] for a reference file that cannot be read.
 pub(crate) fn identity(plan: &ReferencePlan, scene: &str) -> Result<String> {
     match plan {
         ReferencePlan::Render { contender, half_spp } => {
@@ -107,11 +104,8 @@ pub(crate) fn exposure(picture: &RgbImage) -> f32 {
 }
 
 impl Reference {
-    /// Reads given images: one, or two independent halves.
-    ///
-    /// # Errors
-    /// Files that cannot be read; [`Error::Comparison`] for another size or scene, values that are
-    /// not finite, a black picture, or halves that share samples.
+    /// Reads given images: one, or two independent halves. Fails for another size or scene, values that are
+    /// not finite, a black picture, and halves that share samples.
     pub(crate) fn read(plan: &ReferencePlan, scene: &Scene) -> Result<Self> {
         let images = read_images(given_files(plan, &scene.name)?, scene)?;
         if let [(first_path, first), (second_path, second)] = &images[..] {
@@ -135,10 +129,8 @@ impl Reference {
         Self::of(&images, format!("read from {}", names.join(" and ")), scene)
     }
 
-    /// Takes one image or two halves, with the errors that they have themselves.
-    ///
-    /// # Errors
-    /// An image without a picture; [`Error::Comparison`] for a black one.
+    /// Takes one image or two halves, with the errors that they have themselves. Fails without a picture, or
+    /// for a black one.
     pub(super) fn of(
         images: &[(PathBuf, Image)],
         description: String,

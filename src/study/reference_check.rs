@@ -74,10 +74,7 @@ pub struct ReferenceCheck {
 
 impl ReferenceCheck {
     /// Compares two pictures, each in two independent halves. A picture without noise is given
-    /// twice.
-    ///
-    /// # Errors
-    /// [`Error::Comparison`]: pictures of different sizes or without pixels, a black reference.
+    /// twice. Fails for pictures of different sizes or without pixels, and for a black reference.
     pub(crate) fn of(
         reference: [&RgbImage; 2],
         check: [&RgbImage; 2],
@@ -247,10 +244,7 @@ impl Side {
     }
 }
 
-/// Compares a reference with a picture from a file.
-///
-/// # Errors
-/// A file that cannot be read or shows something else.
+/// Compares a reference with a picture from a file. Fails if that shows something else.
 pub(super) fn read(path: &Path, scene: &Scene, reference: &Reference) -> Result<ReferenceCheck> {
     let image = read_checked(path, scene)?.rgb(path)?;
     let description = format!("{}, taken as free of noise,", path.display());

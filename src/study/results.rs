@@ -153,9 +153,6 @@ impl Report {
     }
 
     /// Writes `results.json` and `results.csv`.
-    ///
-    /// # Errors
-    /// [`crate::Error::Io`] with the cause.
     pub(crate) fn write(&self, folder: &Folder) -> Result<()> {
         write_json(&folder.path.join("results.json"), self)?;
         write_text(&folder.path.join("results.csv"), &self.csv())

@@ -122,10 +122,7 @@ pub struct Measurement {
 
 impl Measurement {
     /// Compares the film of `session` with `reference`, as a whole and in the parts that `surfaces`
-    /// tells apart.
-    ///
-    /// # Errors
-    /// The device fails, or a pixel is not finite.
+    /// tells apart. Fails if a pixel is not finite.
     pub(crate) fn of(
         session: &Session,
         reference: &Reference,

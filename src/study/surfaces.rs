@@ -47,9 +47,6 @@ pub struct Parts {
 impl Surfaces {
     /// Reads the mask from `folder` or renders it there; `make` gives a session with the layer of
     /// positions.
-    ///
-    /// # Errors
-    /// A failing device or disk.
     pub(super) fn of(
         folder: &Folder,
         scene: &Scene,
@@ -83,10 +80,7 @@ impl Surfaces {
         Ok(Self { is_surface, own: OwnParts { surface_share, surfaces, environment } })
     }
 
-    /// Measures a picture's errors in both parts.
-    ///
-    /// # Errors
-    /// Values that are not finite, or another size.
+    /// Measures a picture's errors in both parts. Fails for values that are not finite, or another size.
     pub(crate) fn errors(&self, picture: &RgbImage, reference: &Reference) -> Result<Parts> {
         let halves = [&reference.first, &reference.second];
         let [surfaces, environment] = split(picture, halves, &self.is_surface)?;

@@ -46,9 +46,6 @@ impl<'a> Watch<'a> {
     }
 
     /// Fails if the observer interrupts the study.
-    ///
-    /// # Errors
-    /// [`Error::Interrupted`].
     pub(crate) fn check(&self) -> Result<()> {
         if self.observer.interrupt().is_raised() { Err(Error::Interrupted) } else { Ok(()) }
     }
@@ -66,9 +63,6 @@ impl<'a> Watch<'a> {
 
     /// Renders until a rule is met. The forecast counts the run in seconds where `by_time`, else in camera
     /// paths.
-    ///
-    /// # Errors
-    /// [`Error::Interrupted`], or the device fails.
     pub(crate) fn run(
         &mut self,
         session: &mut Session,

@@ -137,10 +137,8 @@ impl Projector {
         Ok(())
     }
 
-    /// Replaces the inset; one of no size is not shown. Fails if the device does.
-    ///
-    /// # Panics
-    /// If it is larger than there is room for.
+    /// Replaces the inset; one of no size is not shown. Fails if the device does. Panics if it is larger than
+    /// there is room for.
     pub(crate) fn set_inset(&mut self, inset: &Inset) -> Result<()> {
         self.inset.upload(bytemuck::cast_slice(&inset.pixels))?;
         self.inset_size = inset.size;

@@ -119,10 +119,7 @@ fn cache(shared: &Shared) -> Option<Cache> {
 }
 
 /// Returns the paths of the fit, which is `--output` or the source's name with extension `fit`, and of its
-/// picture.
-///
-/// # Errors
-/// [`crate::Error::Usage`] if either is one of the `inputs`.
+/// picture. Fails with [`crate::Error::Usage`] if either is one of the `inputs`.
 fn outputs(shared: &Shared, name: &str, inputs: &[PathBuf]) -> Result<[PathBuf; 2]> {
     let fit = shared.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.fit")));
     let picture = fit.with_extension("png");

@@ -42,9 +42,6 @@ fn warn(warnings: &[String]) {
 }
 
 /// Loads a map, or the environment of a scene; derives a name for files, and tells which were read.
-///
-/// # Errors
-/// Those of the readers.
 pub(super) fn environment(path: &Path) -> Result<(EnvironmentMap, String, Vec<PathBuf>)> {
     if extension(path) == "toml" {
         let scene = Scene::load(path)?;
@@ -58,9 +55,6 @@ pub(super) fn environment(path: &Path) -> Result<(EnvironmentMap, String, Vec<Pa
 }
 
 /// Loads a material from a measured file, `SCENE#name` or `TYPE:key=value,…`.
-///
-/// # Errors
-/// Those of the readers, or a text that is none of the three.
 pub(super) fn material(text: &str) -> Result<Source> {
     let path = Path::new(text);
     if let Some((kind, keys)) = text.split_once(':')

@@ -185,10 +185,8 @@ pub(super) fn denoised_path(output: &Path, ending: &str) -> PathBuf {
 }
 
 impl Arguments {
-    /// Lists the frames asked for; one that is none without `--frames`.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for several frames with a name that they would share.
+    /// Lists the frames asked for; one that is none without `--frames`. Fails for several frames with a name
+    /// that they would share.
     pub(super) fn frame_list(&self) -> Result<Vec<Option<u32>>> {
         let Some(frames) = self.frames else { return Ok(vec![None]) };
         if !(self.fps.is_finite() && self.fps > 0.0) {
@@ -266,9 +264,6 @@ impl Arguments {
     /// Checks, before the work, that every file asked for can be written and that none replaces a
     /// file that the scene was read from, or another of them. `--save-guide` may replace the guide
     /// that it started from. `denoises` says that there will be a denoised picture.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for an output that is an input, [`Error::Io`] for one that cannot be written.
     pub(super) fn check_outputs(&self, scene: &Scene, output: &Path, denoises: bool) -> Result<()> {
         let has_png = self.writes_png();
         let preview = has_png.then(|| output.with_extension("png"));
@@ -351,10 +346,8 @@ impl Arguments {
         }
     }
 
-    /// Translates the options into renderer settings, with what a denoiser needs if it `denoises`.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for options that contradict each other or are out of range.
+    /// Translates the options into renderer settings, with what a denoiser needs if it `denoises`. Fails if
+    /// options contradict each other or are out of range.
     pub(super) fn settings(&self, denoises: bool) -> Result<Settings> {
         if let Some(output) = self.output.as_ref().filter(|output| !is_special_file(output)) {
             if extension(output) != "exr" {

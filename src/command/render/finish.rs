@@ -23,10 +23,7 @@ const MOST_DENOISED_IN_HASTE: u64 = 1 << 19;
 
 impl RenderJob<'_> {
     /// Writes the image, then what it continues from, then all other files asked for, each of them even
-    /// if another fails.
-    ///
-    /// # Errors
-    /// The first failure; others are logged.
+    /// if another fails. Returns the first failure; others are logged.
     pub(super) fn finish(&self, session: &mut Session, reason: StopReason) -> Result<()> {
         let sums = session.sums()?;
         let warnings = session.warnings(self.scene);

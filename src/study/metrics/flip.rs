@@ -210,9 +210,6 @@ pub fn flip(picture: &[[u8; 3]], reference: &[[u8; 3]], width: usize) -> Vec<f64
 }
 
 /// Mean of [`flip`] over the pixels.
-///
-/// # Panics
-/// As [`flip`].
 pub(crate) fn mean_flip(picture: &[[u8; 3]], reference: &[[u8; 3]], width: usize) -> f64 {
     flip(picture, reference, width).iter().sum::<f64>() / picture.len().max(1) as f64
 }

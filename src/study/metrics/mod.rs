@@ -162,10 +162,7 @@ fn mean_picture(first: &RgbImage, second: &RgbImage) -> MeanReference {
 }
 
 /// Computes `e(p)` of every pixel: the mean over RGB of `(x − r₁)(x − r₂)`. Pass one reference
-/// twice for the plain squared error.
-///
-/// # Errors
-/// [`Error::Comparison`]: no pixels, different sizes, values that are not finite.
+/// twice for the plain squared error. Fails for no pixels, different sizes and values that are not finite.
 pub(crate) fn squared_errors(
     picture: &RgbImage,
     first: &RgbImage,

@@ -30,10 +30,7 @@ pub struct PartErrors {
 
 impl PartErrors {
     /// Compares a picture with a reference in two halves over the pixels that `is_inside` names;
-    /// `None` if there are none.
-    ///
-    /// # Errors
-    /// As [`squared_errors`].
+    /// `None` if there are none. Fails as [`squared_errors`].
     pub(crate) fn of_halves(
         picture: &RgbImage,
         [first, second]: [&RgbImage; 2],
