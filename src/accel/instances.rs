@@ -139,17 +139,14 @@ pub(super) fn bounds_of(mesh: &Geometry, kept: &[u32]) -> Option<[Vec3; 2]> {
 }
 
 impl Record {
-    /// Takes a point to the space of the mesh.
     pub(super) fn point_to_object(&self, point: Vec3) -> Vec3 {
         map_point(&self.object_from_world, point)
     }
 
-    /// Takes a vector to the space of the mesh.
     pub(super) fn vector_to_object(&self, vector: Vec3) -> Vec3 {
         Vec3::from(self.object_from_world.map(|[x, y, z, _]| Vec3::new(x, y, z).dot(vector)))
     }
 
-    /// Takes a position of the mesh to the world.
     pub(crate) fn point_to_world(&self, position: Vec3) -> Vec3 {
         map_point(&self.world_from_object, position)
     }

@@ -173,7 +173,6 @@ impl MaterialTables {
         Ok(tables)
     }
 
-    /// Appends a table and returns its offset.
     fn append(&mut self, words: &[u32]) -> u32 {
         let first = self.words.len() as u32;
         self.words.extend_from_slice(words);

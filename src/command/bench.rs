@@ -84,9 +84,7 @@ struct Report {
     pass_ms: PassTimes,
     /// Milliseconds of each pass's first use, when drivers compile, and of creating all pipelines.
     compile_ms: PassTimes,
-    /// Host milliseconds by stage.
     host_ms: BTreeMap<String, f64>,
-    /// Bytes per device buffer.
     buffer_bytes: BTreeMap<String, u64>,
 }
 
@@ -215,7 +213,6 @@ fn padded_pixels([width, height]: [u32; 2]) -> u32 {
     width.next_multiple_of(FILM_BLOCK).saturating_mul(height.next_multiple_of(FILM_BLOCK))
 }
 
-/// Formats the report as text.
 fn text(report: &Report) -> String {
     let mut lines = vec![
         format!(

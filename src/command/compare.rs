@@ -44,7 +44,6 @@ pub struct Arguments {
     pub json: bool,
 }
 
-/// Parses `metric=value`.
 fn parse_threshold(text: &str) -> Result<(String, f64), String> {
     let names = Metrics::default().named().map(|(name, _)| name);
     let known = || format!("known metrics: {}", names.join(", "));

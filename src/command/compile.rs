@@ -7,7 +7,6 @@ use crate::{
     pass::compilers,
 };
 
-/// Name of the hidden subcommand.
 const NAME: &str = "compile";
 
 /// Arguments of `compile`.

@@ -48,7 +48,6 @@ pub enum Format {
 }
 
 impl Format {
-    /// Extension of the scene file.
     fn extension(self) -> &'static str {
         match self {
             Self::Mitsuba => "xml",

@@ -195,7 +195,6 @@ struct ChannelSummary {
     mean: Option<f64>,
     /// Samples that are not a number.
     nan: usize,
-    /// Infinite samples.
     infinite: usize,
     /// Samples below 0, including −∞.
     negative: usize,

@@ -21,13 +21,11 @@ use crate::{
     terminal::say,
 };
 
-/// Name of the hidden subcommand.
 const NAME: &str = "self-test";
 /// Output of a process whose device has passed.
 const PASSED: &str = "passed";
 /// Longest test. Compiling takes most of it: 2 s on an idle machine, a minute was seen on a busy one.
 const LONGEST: Duration = Duration::from_secs(300);
-/// Interval between looks at the process.
 const INTERVAL: Duration = Duration::from_millis(5);
 
 /// Arguments of `self-test`.
@@ -96,7 +94,6 @@ pub(crate) fn check(capabilities: &Capabilities) -> Result<()> {
     }
 }
 
-/// Outcome of a test.
 #[derive(Debug, PartialEq, Eq)]
 enum Verdict {
     Passed,

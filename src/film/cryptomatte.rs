@@ -17,7 +17,6 @@ pub const OBJECTS: &str = "CryptoObject";
 pub const MATERIALS: &str = "CryptoMaterial";
 /// Name of what has none.
 pub(crate) const NAMELESS: &str = "unnamed";
-/// Prefix of the attributes.
 pub(crate) const PREFIX: &str = "cryptomatte/";
 
 /// Identifiers and their shares of a pixel, 0…1; a share of 0 without one.
@@ -90,7 +89,6 @@ pub(crate) fn is_channel(name: &str) -> bool {
     layer.is_some_and(|rest| rest.starts_with(|digit: char| digit.is_ascii_digit()))
 }
 
-/// Adds the channels of a layer to an image.
 pub(crate) fn insert(image: &mut Image, layer: &str, shares: &[Shares]) {
     let ranked: Vec<Shares> = shares.par_iter().map(|shares| ranked(shares)).collect();
     for (index, name) in channels(layer).enumerate() {

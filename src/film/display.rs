@@ -34,7 +34,6 @@ pub struct DisplayServer {
     stream: Option<TcpStream>,
     address: String,
     image_name: String,
-    /// True once the image is open there.
     is_open: bool,
 }
 

@@ -159,7 +159,6 @@ fn split<T>(parts: &[T]) -> Result<(&T, &[T])> {
     parts.split_first().ok_or_else(|| Error::usage("nothing to merge"))
 }
 
-/// Names of the channels that every part has.
 fn common_channels<'a>(parts: &'a [Part<'a>]) -> impl Iterator<Item = &'a String> {
     let has = |part: &Part<'_>, name: &String| part.image.channels.contains_key(name);
     let names = parts.first().into_iter().flat_map(|part| part.image.channels.keys());
@@ -175,7 +174,6 @@ struct Samples<'a> {
     companion: &'a [f32],
 }
 
-/// Merges one channel that every part has.
 fn merge_channel(name: &str, parts: &[Part<'_>]) -> Vec<f32> {
     let wanted = match name {
         "Visible.Y" => Some("ShadowRays.Y"),

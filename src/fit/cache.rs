@@ -18,7 +18,6 @@ use crate::{
     files::{self, hexadecimal, write_atomically},
 };
 
-/// Extension of fit files.
 pub(crate) const EXTENSION: &str = "fit";
 const FORMAT: &str = "fenestra-fit";
 

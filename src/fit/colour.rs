@@ -19,7 +19,6 @@ use super::{
 
 /// Most coordinate updates per fit; bounds the time of large fits.
 const MAX_UPDATES: usize = 400_000_000;
-/// Most sweeps.
 const MAX_SWEEPS: usize = 400;
 /// Largest change in a sweep, relative to the largest amplitude, at which sweeps end.
 const TOLERANCE: f64 = 1e-5;

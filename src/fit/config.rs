@@ -34,9 +34,7 @@ pub(crate) const SPLIT_OFFSET: f64 = 0.7;
 
 /// Patches of an environment map per lobe of its fit.
 pub(crate) const PATCHES_PER_LOBE: usize = 80;
-/// Fewest patches of an environment map.
 pub(crate) const MIN_PATCHES: usize = 8192;
-/// Most patches of an environment map.
 pub(crate) const MAX_PATCHES: usize = 65_536;
 /// Steps of expectation maximization that colour the lobes.
 pub(crate) const COLOUR_STEPS: usize = 10;

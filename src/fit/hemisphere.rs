@@ -24,7 +24,6 @@ pub(crate) struct HemisphereSample {
     pub solid_angle: f64,
 }
 
-/// A function on the upper hemisphere.
 #[derive(Clone, Debug)]
 pub(crate) struct HemisphereTarget {
     /// Quadrature over the hemisphere.

@@ -92,7 +92,6 @@ impl PointSet {
         self.weight.is_empty()
     }
 
-    /// Mean direction of a point.
     pub(crate) fn mean(&self, index: usize) -> DVec3 {
         self.places[index].mean.as_dvec3()
     }

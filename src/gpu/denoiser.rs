@@ -21,10 +21,8 @@ use crate::{
 
 /// Environment variable with the library's file, or the folder that holds it.
 pub(crate) const LIBRARY_VARIABLE: &str = "FENESTRA_OIDN";
-/// Names of the library, newest first.
 const NAMES: [&str; 3] =
     ["libOpenImageDenoise.so.2", "libOpenImageDenoise.so.1", "libOpenImageDenoise.so"];
-/// Advice where the library is missing.
 const HELP: &str = "install the library: `./setup` does where it can, openimagedenoise.org offers it for \
                     all; name its folder in FENESTRA_OIDN if the system does not find it";
 
@@ -52,9 +50,7 @@ type SetImage = unsafe extern "C" fn(
 /// A picture and what guides its filter, row by row from the top.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Noisy<'a> {
-    /// Width in pixels.
     pub width: u32,
-    /// Height in pixels.
     pub height: u32,
     /// Linear radiance; finite.
     pub color: &'a [[f32; 3]],

@@ -24,9 +24,7 @@ use crate::{
 
 /// Environment variable with the library's file, or the folder that holds it.
 const LIBRARY_VARIABLE: &str = "FENESTRA_EMBREE";
-/// Names of the library, newest first.
 const NAMES: [&str; 2] = ["libembree4.so.4", "libembree3.so.3"];
-/// Advice where the library is missing.
 const HELP: &str = "install the library (Debian: libembree3-3 or libembree4-4, as ./setup does), and name \
                     its folder in FENESTRA_EMBREE if the system does not find it";
 
@@ -84,7 +82,6 @@ pub(crate) struct Embree {
     device_error: unsafe extern "C" fn(Handle) -> c_int,
     release_device: unsafe extern "C" fn(Handle),
     pub(super) device: Handle,
-    /// Version of the library: "3.13.5".
     pub(crate) version: String,
     /// Never unloaded: threads of the library may outlive its device.
     _library: ManuallyDrop<Library>,

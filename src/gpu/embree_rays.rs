@@ -43,7 +43,6 @@ pub(crate) struct Packet {
 }
 
 impl Packet {
-    /// Makes a packet without rays.
     pub(crate) fn new() -> Self {
         Self {
             // The mask lets rays meet all geometry.

@@ -16,7 +16,6 @@ use crate::{
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// Advice for a system without any usable Vulkan.
 pub(crate) const NO_VULKAN_HELP: &str =
     "run ./setup, which installs the Vulkan loader and the software device lavapipe";
 

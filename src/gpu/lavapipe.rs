@@ -9,9 +9,7 @@ use crate::error::{Error, Result};
 const FAST_MESA: u32 = 25;
 /// Mesa whose shader cache is known to tell vector widths apart; that of 25.0 does not.
 const SOUND_CACHE_MESA: u32 = 22;
-/// Sets the lanes of lavapipe's vectors, in bits.
 const VECTOR_WIDTH: &str = "LP_NATIVE_VECTOR_WIDTH";
-/// Turns Mesa's shader cache off.
 const CACHE_DISABLE: &str = "MESA_SHADER_CACHE_DISABLE";
 /// First letters of the variables by which loader and drivers change the code that they make or run.
 const PREFIXES: [&str; 10] =

@@ -27,7 +27,6 @@ pub struct RayReadback {
 }
 
 impl RayReadback {
-    /// Returns the ray as JSON.
     pub(crate) fn numbers(&self) -> Value {
         json!({
             "direction": self.direction.to_array(),
@@ -54,11 +53,9 @@ pub struct LobeReadback {
 pub trait Explanation: Any {
     /// Unit shading normal of the hit.
     fn normal(&self) -> Vec3;
-    /// Shadow rays at the hit.
     fn rays(&self) -> Vec<RayReadback>;
     /// Draws functions of direction that the technique chose by, `width` pixels wide.
     fn skies(&self, scene: &Scene, width: usize) -> Vec<Sky>;
-    /// Returns everything as JSON.
     fn numbers(&self) -> Value;
 }
 

@@ -24,7 +24,6 @@ use crate::{
 
 /// Rows of other pages that a page keeps the radiance of: one before it and one after.
 const EDGE_ROWS: u64 = 2;
-/// Bytes of a colour.
 const RADIANCE_BYTES: u64 = size_of::<[f32; 3]>() as u64;
 /// Pixels of a block in film order; waves hold whole blocks.
 pub(crate) const BLOCK_PIXELS: u32 = FILM_BLOCK * FILM_BLOCK;
@@ -191,7 +190,6 @@ impl FilmBuffers {
         self.page_positions = self.padded_pixels();
     }
 
-    /// Tests whether the whole window is read back.
     pub(crate) fn is_whole(&self) -> bool {
         self.kept == self.window
     }
@@ -245,7 +243,6 @@ impl FilmBuffers {
         padded_pixels(self.window)
     }
 
-    /// Sets everything to zero.
     pub(crate) fn clear(&self, device: &Arc<Device>) -> Result<()> {
         let mut commands = Commands::begin(device)?;
         for buffer in self.buffers() {
@@ -338,12 +335,10 @@ impl FilmBuffers {
         self.upload_groups(sums)
     }
 
-    /// Bytes of the radiance of a sample.
     fn sample_bytes(&self) -> u64 {
         (1 + self.light_groups.len() as u64) * RADIANCE_BYTES
     }
 
-    /// Reads the sums of the groups of lights.
     fn download_groups(&self) -> Result<Vec<GroupSums>> {
         let mut all: Vec<[f32; 3]> = Vec::new();
         let values = 2 * self.light_groups.len();

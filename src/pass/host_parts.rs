@@ -21,7 +21,6 @@ const MOST_COPIES: usize = 1 << 23;
 /// Bytes that one takes while the tree is built.
 const COPY_BYTES: usize = 250;
 
-/// Number of triangles of instances.
 fn copies(accel: &Accel) -> usize {
     let meshes = accel.instance_meshes.iter().filter(|mesh| **mesh != PLACED);
     meshes.map(|mesh| triangles_of(accel, *mesh).len()).sum()

@@ -31,7 +31,6 @@ const THRESHOLD_SCALE: u64 = u32::MAX as u64;
 
 /// Clusters up to which lamps are drawn by power: so few cost less than the choice by place.
 const FEW_CLUSTERS: usize = 32;
-/// Most clusters of lamps.
 const MOST_CLUSTERS: usize = 1024;
 /// Extent of connected triangles that are not divided further, as a share of the radius of the scene.
 const SMALL_CLUSTER: f32 = 1.0 / 8.0;
@@ -42,7 +41,6 @@ pub(crate) struct LampTables {
     /// Alias table over emitting triangles and lamps, in proportion to their power. The tables of the
     /// clusters follow.
     pub choices: Vec<structs::LampChoice>,
-    /// Number of emitting triangles and lamps.
     pub source_count: u32,
     /// Lights without a surface.
     pub lamps: Vec<structs::Lamp>,
@@ -161,7 +159,6 @@ impl LampTables {
         true
     }
 
-    /// Adds clusters and their tables.
     fn add_clusters(&mut self, accel: &Accel, sources: &[Source], members: &[Vec<u32>]) {
         self.triangle_clusters = vec![0; accel.placed_count()];
         for members in members {

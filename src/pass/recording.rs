@@ -15,7 +15,6 @@ use crate::{
 /// Passes over a wave, in their order.
 pub struct Recording<'a> {
     device: &'a Arc<Device>,
-    /// Commands before the next pass.
     pub(super) commands: Commands,
     /// Passes of one submission, at most.
     most_passes: u32,
@@ -83,7 +82,6 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// Adds times by pass.
 pub(super) fn add_times(times: &mut PassTimes, more: &PassTimes) {
     for (pass, ms) in more {
         *times.entry(pass.clone()).or_default() += ms;

@@ -37,14 +37,12 @@ use crate::{
 pub struct SceneBuffers {
     /// Descriptor set 0.
     pub set: DescriptorSet,
-    /// Tree and triangles.
     pub(crate) geometry: GeometryBuffers,
     parameters: SceneParameters,
     /// Specialization of passes by the surfaces of the scene.
     pub surfaces: Surfaces,
     /// Part of the film that the parameters describe.
     pub(crate) window: Window,
-    /// Groups of the scene's lights.
     pub(crate) light_groups: LightGroups,
     /// Host milliseconds by stage: `bvh`, `upload`.
     pub(crate) host_ms: BTreeMap<String, f64>,
@@ -184,7 +182,6 @@ impl SceneBuffers {
         self.set.buffer(bindings::PARAMETERS).upload(bytemuck::bytes_of(&parameters))
     }
 
-    /// Filter of the film.
     pub(crate) fn filter(&self) -> Filter {
         match self.parameters.film_filter {
             FILTER_GAUSSIAN => Filter::Gaussian,
@@ -238,7 +235,6 @@ fn parameters(
     with_camera(parameters, &scene.camera)
 }
 
-/// Replaces the camera.
 fn with_camera(parameters: SceneParameters, camera: &Camera) -> SceneParameters {
     let [right, up, forward] = camera.axes();
     SceneParameters {
@@ -260,7 +256,6 @@ struct Mattes {
     triangle_objects: Vec<u32>,
     /// By instance in the order of the scene.
     instance_objects: Vec<u32>,
-    /// By material.
     materials: Vec<u32>,
 }
 

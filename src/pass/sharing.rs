@@ -47,7 +47,6 @@ pub(crate) struct Sharing {
     pub surfaces: Surfaces,
     /// Specialization of the passes that traverse.
     pub traversal: Traversal,
-    /// Schedule of the connections.
     pub schedule: Schedule,
 }
 

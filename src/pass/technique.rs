@@ -26,7 +26,6 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Index of the next sample.
     pub(crate) fn next_sample(&self) -> u32 {
         self.first_sample.wrapping_add(self.sample_count)
     }

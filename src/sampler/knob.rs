@@ -7,7 +7,6 @@ use crate::error::{Error, Result};
 /// Names of the values of switches.
 pub const ON_OR_OFF: &[(&str, bool)] = &[("on", true), ("off", false)];
 
-/// A parameter of `P`.
 pub struct Knob<P> {
     /// Key of `--set`, also in metadata and statistics.
     pub key: &'static str,
@@ -15,13 +14,11 @@ pub struct Knob<P> {
     pub about: &'static str,
     /// Sets the value, or fails with a description of the expected one.
     pub set: fn(&mut P, &str) -> Result<(), String>,
-    /// Returns the value as text.
     pub get: fn(&P) -> String,
 }
 
 /// Parameters that a table of knobs sets.
 pub trait Knobs: Clone + Sized + 'static {
-    /// The table.
     const KNOBS: &'static [Knob<Self>];
 
     /// Sets a parameter; returns false for an unknown key, [`Error::Usage`] for a value out of range.
@@ -48,7 +45,6 @@ pub trait Knobs: Clone + Sized + 'static {
         Self::KNOBS.iter().map(entry).collect()
     }
 
-    /// Returns all parameters by key.
     fn describe(&self) -> BTreeMap<String, String> {
         Self::KNOBS.iter().map(|knob| (knob.key.to_owned(), (knob.get)(self))).collect()
     }
@@ -58,7 +54,6 @@ pub trait Knobs: Clone + Sized + 'static {
 pub trait Values<T> {
     /// Parses a value, or returns a description of the expected ones.
     fn parse(&self, text: &str) -> Result<T, String>;
-    /// Returns a value as text.
     fn text(&self, value: &T) -> String;
 }
 

@@ -37,11 +37,8 @@ const SHOWN_SEED: u32 = 1;
 /// Everything a study has measured.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Results {
-    /// Scenes in the plan's order.
     pub scenes: Vec<StudiedScene>,
-    /// Finished runs.
     pub runs: Vec<Run>,
-    /// Finished overhead rounds.
     pub rounds: Vec<Round>,
 }
 
@@ -70,7 +67,6 @@ pub(crate) fn run(
     Ok((results, done.err()))
 }
 
-/// A study at work.
 pub(super) struct Study<'a> {
     pub(super) plan: &'a Plan,
     pub(super) folder: &'a Folder,
@@ -108,7 +104,6 @@ impl Study<'_> {
         Ok(scenes)
     }
 
-    /// Adds a scene's work to the forecast.
     fn expect(&mut self, scene: &Scene) {
         let pixels = pixels(scene);
         if let (true, ReferencePlan::Render { half_spp, .. }) =
@@ -155,7 +150,6 @@ impl Study<'_> {
         Ok(())
     }
 
-    /// Prepares to render the scene at work.
     pub(super) fn session(&mut self, scene: &Scene, settings: Settings) -> Result<Session> {
         let buffers = match &mut self.buffers {
             Some(buffers) => buffers,

@@ -38,9 +38,7 @@ impl Scale {
 /// A display picture: sRGB bytes, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Canvas {
-    /// Width in pixels.
     pub width: usize,
-    /// Height in pixels.
     pub height: usize,
     /// Row by row from the top.
     pub pixels: Vec<[u8; 3]>,
@@ -107,7 +105,6 @@ impl Canvas {
         }
     }
 
-    /// Writes a PNG, atomically.
     pub(crate) fn write_png(&self, path: &Path) -> Result<()> {
         write_png(path, self.width as u32, &self.pixels)
     }

@@ -25,12 +25,9 @@ use crate::{
     files::{check_replaces_nothing_in, check_writable, write_json},
 };
 
-/// File that marks a report folder.
 const MARK: &str = "study.json";
-/// Text of its `format`.
 const FORMAT: &str = "fenestra study 3";
 
-/// A report folder.
 #[derive(Clone, Debug)]
 pub struct Folder {
     pub(crate) path: PathBuf,

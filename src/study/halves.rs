@@ -24,7 +24,6 @@ use crate::{
 /// Time between checkpoints of a reference's half: even a killed program loses only the passes since the
 /// last.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
-/// File stems of the check's halves.
 const CHECK_STEMS: [&str; 2] = ["reference_check_1", "reference_check_2"];
 /// Seeds of the check's halves; those of the reference lie above, those of runs count up from 1.
 const CHECK_SEEDS: [u32; 2] = [u32::MAX - 3, u32::MAX - 2];

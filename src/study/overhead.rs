@@ -94,7 +94,6 @@ pub(super) fn describe_parameters(plan: &OverheadPlan) -> BTreeMap<String, Strin
 /// Overhead of one sampler in one scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Overhead {
-    /// Scene's name.
     pub scene: String,
     /// Contender's label.
     pub sampler: String,
@@ -110,7 +109,6 @@ pub struct Overhead {
     pub wall: Interval,
     /// Median device milliseconds per sample: of the baseline, and of this sampler.
     pub total_ms: [f64; 2],
-    /// Overhead of each pass.
     pub passes: Vec<PassOverhead>,
     /// Median of the sampler's other figures, by name.
     pub statistics: BTreeMap<String, f64>,
@@ -118,10 +116,8 @@ pub struct Overhead {
     pub rounds: usize,
 }
 
-/// Time of one pass.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PassOverhead {
-    /// Name of the pass.
     pub pass: String,
     /// Median device milliseconds per sample: of the baseline, and of this sampler; 0 if absent.
     pub ms: [f64; 2],

@@ -26,7 +26,6 @@ pub enum Figure {
 }
 
 impl Figure {
-    /// Every figure.
     pub const ALL: [Self; 2] = [Self::Relmse, Self::RelmseTrimmed];
 
     /// Name in `results.csv`.
@@ -53,12 +52,7 @@ pub(crate) enum Time {
     /// Its first look was already there: no later than these seconds.
     AtMost(f64),
     /// Its last look is above the threshold, with that look's error, after these seconds.
-    NotReached {
-        /// Seconds of the last look.
-        seconds: f64,
-        /// Error of the last look.
-        error: f64,
-    },
+    NotReached { seconds: f64, error: f64 },
 }
 
 impl Time {
@@ -100,7 +94,6 @@ pub(crate) fn time_of_run(run: &Run, figure: Figure, threshold: f64) -> Option<T
 /// Time of one sampler in one scene, over the seeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TimeToQuality {
-    /// Scene's name.
     pub scene: String,
     /// Contender's label.
     pub sampler: String,

@@ -22,7 +22,6 @@ use crate::{
     scene::Scene,
 };
 
-/// File stems of the halves.
 pub(crate) const HALF_STEMS: [&str; 2] = ["reference_1", "reference_2"];
 /// Seeds of the halves; those of runs count up from 1.
 pub const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
@@ -30,11 +29,9 @@ pub const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
 /// A reference with its own errors.
 #[derive(Clone, Debug)]
 pub(crate) struct Reference {
-    /// First half.
     pub first: RgbImage,
     /// Second half; the first again if there is only one image.
     pub second: RgbImage,
-    /// Sampler, if known.
     pub sampler: Option<String>,
     pub own: OwnErrors,
 }
@@ -87,7 +84,6 @@ pub(super) fn read_images(paths: Vec<PathBuf>, scene: &Scene) -> Result<Vec<(Pat
     paths.into_iter().map(read).collect()
 }
 
-/// Averages two halves.
 pub fn mean(first: &RgbImage, second: &RgbImage) -> RgbImage {
     let mean = |(a, b): (&[f32; 3], &[f32; 3])| {
         std::array::from_fn(|channel| 0.5 * (a[channel] + b[channel]))

@@ -33,7 +33,6 @@ pub(crate) const BLOCK_LIMIT: f64 = 5.0;
 /// Relative standard error of the difference of the means above which nothing can be told.
 pub(crate) const NOISE_LIMIT: f64 = 0.02;
 
-/// Result of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -60,7 +59,6 @@ pub struct ReferenceCheck {
     pub mean_standard_error: f64,
     /// The difference in its standard errors.
     pub mean_deviation: f64,
-    /// Blocks compared.
     pub blocks: usize,
     /// Largest difference of a block in its standard errors.
     pub block_deviation: f64,
@@ -68,7 +66,6 @@ pub struct ReferenceCheck {
     pub block_difference: f64,
     /// Left, top, width and height of that block in pixels.
     pub block: [u32; 4],
-    /// Conclusion.
     pub verdict: Verdict,
 }
 
@@ -238,7 +235,6 @@ impl Side {
         self.weighted(|block| block.mean, |share| share)
     }
 
-    /// Variance of the mean.
     fn variance(&self) -> f64 {
         self.inflation * self.weighted(|block| block.variance, |share| share * share)
     }

@@ -20,23 +20,18 @@ use crate::{
     session::Figures,
 };
 
-/// Title of a study without one.
 const DEFAULT_TITLE: &str = "Comparison of samplers";
 
 /// Machine, version and command of a study.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Circumstances {
-    /// Fenestra's version.
     pub version: String,
     /// When the results were written, UTC.
     pub date: String,
-    /// The command line.
     pub command: String,
     /// Processor, cores that the program may use, operating system.
     pub machine: String,
-    /// Vulkan device.
     pub device: String,
-    /// Its driver.
     pub driver: String,
 }
 
@@ -74,13 +69,10 @@ fn machine() -> String {
 /// Everything in `results.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// Heading.
     pub title: String,
-    /// Paragraphs under the heading.
     pub notes: Vec<String>,
     /// True unless the study was interrupted before its end.
     pub is_complete: bool,
-    /// Machine, version and command.
     pub circumstances: Circumstances,
     /// Directions traced at every vertex; each sampler's own number if absent.
     pub shadow_rays: Option<u32>,
@@ -95,23 +87,15 @@ pub struct Report {
     /// Rules in the order of the plan.
     #[serde(skip)]
     pub rules: Vec<Rule>,
-    /// Scenes.
     pub scenes: Vec<StudiedScene>,
-    /// Figures over the seeds.
     pub summaries: Vec<Summary>,
-    /// Errors against samples and time.
     pub curves: Vec<Curve>,
     /// Seconds until errors fall to thresholds.
     pub times_to_quality: Vec<TimeToQuality>,
-    /// Overheads.
     pub overheads: Vec<Overhead>,
-    /// Published errors to compare ratios with.
     pub published_errors: Vec<PublishedErrors>,
-    /// Published overheads.
     pub published_overheads: Vec<PublishedOverhead>,
-    /// Every run.
     pub runs: Vec<Run>,
-    /// Every overhead round.
     pub rounds: Vec<Round>,
 }
 
@@ -152,7 +136,6 @@ impl Report {
         }
     }
 
-    /// Writes `results.json` and `results.csv`.
     pub(crate) fn write(&self, folder: &Folder) -> Result<()> {
         write_json(&folder.path.join("results.json"), self)?;
         write_text(&folder.path.join("results.csv"), &self.csv())

@@ -22,15 +22,10 @@ use crate::{
 /// Conditions of a run besides its sampler, rule and seed; a run is reused only if all agree.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Conditions {
-    /// Fenestra's version.
     pub version: String,
-    /// `Scene::hash`.
     pub scene_hash: String,
-    /// Width and height of the film in pixels.
     pub film: [u32; 2],
-    /// Vulkan device.
     pub device: String,
-    /// Its driver.
     pub driver: String,
     /// Directions traced at every vertex.
     pub shadow_rays: u32,
@@ -92,7 +87,6 @@ pub(super) fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> 
 /// Errors of a film after some samples.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
-    /// Samples per pixel.
     pub spp: u32,
     /// Wall time of the passes so far, seconds.
     pub seconds: f64,
@@ -169,15 +163,12 @@ impl Measurement {
 /// One finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// Scene's name.
     pub scene: String,
     /// Contender's label.
     pub sampler: String,
     /// Rule that ended it.
     pub rule: Rule,
-    /// Seed of the random numbers.
     pub seed: u32,
-    /// Conditions it was made under.
     pub conditions: Conditions,
     /// Measurements by ascending samples; the last is of the finished film.
     pub measurements: Vec<Measurement>,
@@ -228,13 +219,11 @@ impl Timing {
 /// One round of overhead measurements: every sampler once, one after the other.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Round {
-    /// Scene's name.
     pub scene: String,
     /// Number of the round from 1, also the seed.
     pub repetition: u32,
     /// Samples per pixel of each measurement.
     pub spp: u32,
-    /// Conditions it was made under.
     pub conditions: Conditions,
     /// In the order of measurement, which rotates by one from round to round.
     pub timings: Vec<Timing>,
@@ -243,17 +232,11 @@ pub struct Round {
 /// A scene of a study.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StudiedScene {
-    /// Name.
     pub name: String,
-    /// File.
     pub path: String,
-    /// `Scene::hash`.
     pub hash: String,
-    /// Film width in pixels.
     pub width: u32,
-    /// Film height in pixels.
     pub height: u32,
-    /// Triangles.
     pub triangles: u64,
     /// The reference's own errors, if errors were compared.
     pub reference: Option<OwnErrors>,

@@ -19,7 +19,6 @@ use crate::{
 
 /// File stem of the mask: share of the camera rays that hit a surface, in every channel.
 pub(crate) const STEM: &str = "surfaces";
-/// Camera rays per pixel.
 const RAY_COUNT: u32 = 16;
 /// Attribute that says which scene a mask is of.
 const HASH: &str = "fenestra.scene_hash";

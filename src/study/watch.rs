@@ -40,7 +40,6 @@ impl<'a> Watch<'a> {
         self.seconds_left += seconds;
     }
 
-    /// Shows a permanent line.
     pub(crate) fn note(&mut self, line: &str) {
         self.observer.notice(&Event::Note(line));
     }

@@ -118,7 +118,6 @@ impl TextureTables {
     }
 }
 
-/// Adds words `range` of texels of two words each.
 fn extend_by_pairs(words: &mut Vec<u32>, texels: &[[u16; 4]], range: Range<usize>) {
     words.extend(range.map(|word| {
         let texel = texels[word / 2];

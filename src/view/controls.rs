@@ -15,7 +15,6 @@ use super::{
 };
 use crate::{film::Curve, sampler::Sampler};
 
-/// Width of the panel, pixels.
 pub(super) const WIDTH: u32 = 250;
 /// Least size of a window with a panel, pixels.
 const LEAST_WINDOW: [u32; 2] = [WIDTH + 160, 200];
@@ -96,7 +95,6 @@ impl Controls {
         self.context.is_using_pointer() || self.context.is_pointer_over_area()
     }
 
-    /// Moves the pointer to a pixel.
     pub(super) fn point(&mut self, [x, y]: [f64; 2]) {
         self.pointer = pos2(x as f32, y as f32);
         self.events.push(Event::PointerMoved(self.pointer));
@@ -108,7 +106,6 @@ impl Controls {
         self.events.push(Event::PointerButton { pos, button, pressed, modifiers });
     }
 
-    /// Scrolls by pixels upward.
     pub(super) fn scroll(&mut self, pixels: f32) {
         let (unit, delta) = (egui::MouseWheelUnit::Point, vec2(0.0, pixels));
         self.events.push(Event::MouseWheel { unit, delta, modifiers: Default::default() });

@@ -99,7 +99,6 @@ const KEYS: &[(&str, Action, &str)] = &[
     ("Escape", Action::Quit, "hide these keys, or close the window"),
 ];
 
-/// Returns the effect of a key.
 pub(crate) fn action_of(key: &str) -> Option<Action> {
     let key = if key.chars().count() == 1 { key.to_lowercase() } else { key.to_owned() };
     let of_sampler = || Sampler::ALL.iter().copied().find(|sampler| sampler.key() == key);

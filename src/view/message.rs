@@ -10,9 +10,7 @@ use crate::{
 /// Message from the window to the renderer.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Input {
-    /// A key was pressed.
     Key(Action),
-    /// A control was set.
     Set(Setting),
     /// Directions to fly to changed: right, up, forward, −1 to 1 each.
     Held([f32; 3]),
@@ -28,7 +26,6 @@ pub(super) enum Input {
     Overlay(Overlay),
     /// The window has this size now, pixels.
     Resized([u32; 2]),
-    /// The window was uncovered.
     Redraw,
     Close,
 }
@@ -59,7 +56,6 @@ pub(super) enum Drag {
     Pan,
 }
 
-/// Value of a control.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Setting {
     /// Exposure, stops.
@@ -96,9 +92,7 @@ impl Denoise {
 /// State of the renderer, for title and controls.
 #[derive(Clone, Debug)]
 pub(super) struct Status {
-    /// Title of the window.
     pub title: String,
-    /// Sampler that keys and controls choose.
     pub sampler: Sampler,
     /// True while two samplers are shown.
     pub is_split: bool,
@@ -113,7 +107,6 @@ pub(super) struct Status {
     pub camera: Camera,
     /// Samples per pixel, and those at which the film is finished.
     pub samples: [u32; 2],
-    /// Seconds of rendering.
     pub seconds: f64,
     /// Mean relative standard error, as far as it is known.
     pub error: Option<f64>,

@@ -72,7 +72,6 @@ impl Side {
         Ok(sums.position.iter().enumerate().map(mean).collect())
     }
 
-    /// Samples per pixel in the film.
     pub(crate) fn sample_count(&self) -> u32 {
         self.session.renderer.sample_count()
     }

@@ -45,7 +45,6 @@ const PIXELS_PER_NOTCH: f64 = 40.0;
 const FOLLOWING: Duration = Duration::from_millis(250);
 /// Way of the pointer, pixels, up to which a press and a release are a click.
 const CLICK_WAY: f64 = 4.0;
-/// Advice without a display.
 const NO_DISPLAY_HELP: &str =
     "a window needs DISPLAY to name a running X server; `fenestra render` needs none";
 
@@ -142,7 +141,6 @@ struct App {
     controls: Controls,
     /// Time that the controls were drawn last.
     drawn_at: Instant,
-    /// Width and height of the window, pixels.
     size: [u32; 2],
     /// True if they must be drawn at once.
     is_due: bool,

@@ -99,7 +99,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// Runs `work` with a progress bar.
 fn with_progress<T>(
     label: &str,
     quiet: bool,

@@ -176,7 +176,6 @@ pub struct Arguments {
 
 /// Interval of the preview of a picture to show.
 pub(super) const PNG_INTERVAL: Duration = Duration::from_secs(5);
-/// Maximum film width of `--quick`, pixels.
 const QUICK_WIDTH: u32 = 240;
 
 /// `out.exr` → `out.denoised.exr`, or with another ending.
@@ -222,7 +221,6 @@ impl Arguments {
         own
     }
 
-    /// Image of a frame.
     pub(super) fn image_path(&self, frame: Option<u32>) -> PathBuf {
         self.output.clone().unwrap_or_else(|| {
             let name = scene_name(&self.scene);

@@ -32,9 +32,7 @@ use crate::{
     terminal::say,
 };
 
-/// Time between checkpoints unless given.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
-/// Samples per pixel of `--quick`.
 const QUICK_SPP: u32 = 16;
 
 /// Renders a scene, or frames of it.
@@ -69,10 +67,8 @@ struct Carried {
 /// All that renders one frame after the other.
 struct Sequence {
     interrupt: Arc<Interrupt>,
-    /// True if there will be denoised pictures.
     denoises: bool,
     denoiser: Option<Denoiser>,
-    /// Device, once it is needed.
     device: Option<Arc<Device>>,
     carried: Option<Carried>,
     /// Warnings given so far.
@@ -232,11 +228,9 @@ struct RenderJob<'a> {
     arguments: &'a Arguments,
     scene: &'a Scene,
     output: PathBuf,
-    /// Layers of the image.
     aovs: Vec<Aov>,
     /// Denoiser, if the picture is to be denoised.
     denoiser: Option<&'a Denoiser>,
-    /// Time that loading took, milliseconds.
     load_ms: f64,
     /// Time of the frame in the animation, seconds.
     time: Option<f64>,
@@ -277,7 +271,6 @@ impl RenderJob<'_> {
         self.arguments.display_server.as_ref().map(connect).transpose()
     }
 
-    /// Writes the picture of `--pixel`.
     fn explain(&self, explanation: Option<&dyn Explanation>, at: [u32; 2]) -> Result<()> {
         let Some(explanation) = explanation else {
             let [x, y] = at;

@@ -70,7 +70,6 @@ fn locked_folder(path: &Path) -> Option<fs::File> {
     Some(folder)
 }
 
-/// Path and bytes of a guide.
 pub(crate) type GuideFile = (PathBuf, Vec<u8>);
 
 impl Checkpoint {

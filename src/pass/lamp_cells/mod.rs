@@ -42,7 +42,6 @@ const WALKS: u32 = 1 << 14;
 const WALK_PLACES: u32 = 4;
 /// Most cells with surfaces.
 const MOST_CELLS: usize = 8192;
-/// Most cells of the grid.
 const MOST_GRID_CELLS: u64 = 1 << 19;
 /// Edge of the cells that others fall back on, in cells.
 const COARSE: u32 = 4;
@@ -51,7 +50,6 @@ const MOST_RAYS: usize = 1 << 21;
 const RAYS_PER_CLUSTER: usize = 1 << 13;
 /// Most clusters that a cell looks at closely.
 const MOST_TRIED: usize = 48;
-/// Most entries of a list.
 const MOST_ENTRIES: usize = 32;
 /// Places of a cell that rays start from, one to each cluster. Four may all lie in the next room.
 const PLACES: usize = 16;
@@ -258,7 +256,6 @@ struct Survey<'a> {
     passes: Vec<bool>,
     /// True for materials that emit to both sides.
     two_sided: Vec<bool>,
-    /// Radius of the scene, metres.
     radius: f32,
     offset: f32,
 }

@@ -223,7 +223,6 @@ impl Arms {
         self.first[usize::from(is_open)]
     }
 
-    /// Returns the passes of an arm.
     pub(super) fn steps(&self, arm: &Arm) -> Box<dyn Steps> {
         let roulette = Roulette { throughput: arm.roulette_throughput, ..self.roulette };
         if arm.is_guided {

@@ -72,7 +72,6 @@ pub struct GuideBuffers {
     device: Arc<Device>,
     /// Descriptor set 1.
     pub set: DescriptorSet,
-    /// The regions of the environment.
     pub(super) partition: Partition,
     /// True if the regions differ from those at the start.
     is_split: bool,

@@ -26,7 +26,6 @@ pub const MAX_CELLS: usize = 1 << 22;
 /// in for places without a cell of their own.
 #[derive(Clone, Debug)]
 pub struct Cells {
-    /// Number of cells there is room for.
     pub(super) capacity: usize,
     slots: usize,
     /// Keys of all cells; those of the faces are [`CellKey::NONE`].
@@ -42,7 +41,6 @@ pub struct Cells {
 pub(super) struct Tree {
     /// Parent of every cell; faces are their own.
     pub(super) parents: Vec<usize>,
-    /// Children of every cell.
     pub(super) children: Vec<Vec<usize>>,
     /// The faces, then all other cells with children and all coarse cells, level by level.
     pub(super) generations: Vec<Vec<usize>>,

@@ -15,7 +15,6 @@ pub const GUIDED_CANDIDATES: [u32; 3] = [1, 4, 8];
 
 /// Most rounds of a race.
 pub const MOST_ROUNDS: u32 = 4;
-/// Groups of blocks.
 const GROUPS: usize = 8;
 /// Share of the pixels that the trimmed figure leaves out.
 const TRIMMED: f64 = 1e-3;

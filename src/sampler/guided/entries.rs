@@ -45,7 +45,6 @@ fn power_index(visibility: f32) -> usize {
 }
 
 impl EntryTables {
-    /// Tables for the regions of `partition`.
     pub fn new(partition: &Partition) -> Self {
         let inverse = |region: &Region| {
             let inverse = 1.0 / (f64::from(REGION_SCALE) * region.share);
@@ -78,7 +77,6 @@ pub struct EntryWriter<'a> {
 }
 
 impl<'a> EntryWriter<'a> {
-    /// Writer for the regions of `tables`.
     pub fn new(tables: &'a EntryTables) -> Self {
         let (weights, levels, parts, starts) = Default::default();
         Self { tables, weights, levels, parts, starts }

@@ -25,7 +25,6 @@ const PRIOR_HITS: f32 = 8.0;
 /// Largest factor by which a parent region raises the prior.
 const MAX_RATIO: f32 = 8.0;
 
-/// Estimate for one region.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
     /// V̂, the fraction of rays that reach the environment.
@@ -56,11 +55,8 @@ impl Ratio {
 
 /// Properties of the regions that estimates depend on.
 pub struct RegionTables {
-    /// Share of the energy of every region.
     shares: Vec<f64>,
-    /// Parent of every region.
     parents: Vec<u8>,
-    /// [`facing`] of every face and region.
     facing: Vec<Vec<f32>>,
 }
 

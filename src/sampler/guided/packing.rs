@@ -1,7 +1,6 @@
 //! Words of a guide's file. Most are 0 or small: each is a number of LEB128, and after a 0 follows how many
 //! more there are.
 
-/// Packs words into bytes.
 pub fn pack(words: impl IntoIterator<Item = u32>) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut zeros = 0;

@@ -70,7 +70,6 @@ pub(super) struct Race<'a> {
     pub(super) tag: u32,
 }
 
-/// The passes of one arm.
 struct Trial<'a> {
     buffers: &'a GuideBuffers,
     steps: Box<dyn Steps>,

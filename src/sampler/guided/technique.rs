@@ -93,9 +93,7 @@ pub(super) struct Choice {
     pub(super) arm: Arm,
     /// Samples per pixel from which it is in use.
     since: u32,
-    /// Races so far.
     races: u32,
-    /// Measurements of these.
     costs: Vec<ArmCost>,
     ms: f64,
 }

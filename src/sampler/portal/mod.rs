@@ -63,7 +63,6 @@ pub fn steps(parameters: &Parameters, count: u32, surfaces: Surfaces) -> RayStep
     RaySteps::new("sample_portals", &own, surfaces)
 }
 
-/// Makes descriptor set 1 of the portals.
 fn upload(device: &Arc<Device>, portals: &[Portal]) -> Result<DescriptorSet> {
     let texels = |portal: &Portal| {
         let ([first, second], [width, height]) = (portal.axes, portal.size);

@@ -42,7 +42,6 @@ impl LobeSize {
 pub struct LobeBuffers {
     /// Descriptor set 1.
     pub set: DescriptorSet,
-    /// The fits.
     pub(super) fits: Fits,
 }
 

@@ -17,11 +17,9 @@ pub const PARENT_COUNT: usize = 64;
 /// Energy and solid angle of every cell of a map, unnormalised.
 #[derive(Debug)]
 pub struct MapCells {
-    /// Columns.
     pub width: usize,
     /// Rows, one more than the map has.
     pub rows: usize,
-    /// Energy per cell.
     pub energy: Vec<f64>,
     /// Solid angle of one cell by row, as a fraction of the sphere.
     pub row_angle: Vec<f64>,

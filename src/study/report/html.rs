@@ -70,7 +70,6 @@ pub struct Table {
 }
 
 impl Table {
-    /// Creates a table without rows.
     pub(crate) fn new(caption: String, head: &[&str]) -> Self {
         let head = head.iter().map(|text| (*text).to_owned()).collect();
         Self { caption, head, rows: Vec::new() }

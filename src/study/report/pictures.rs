@@ -43,9 +43,7 @@ pub struct Picture {
 /// A magnified part, in shares of the picture's width and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crop {
-    /// Left edge.
     pub left: f64,
-    /// Upper edge.
     pub top: f64,
     /// Share of width and height that is shown.
     pub size: f64,

@@ -17,9 +17,7 @@ pub(crate) const STYLE_COUNT: usize = 8;
 /// A point with its band or error bar.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Point {
-    /// Abscissa.
     pub x: f64,
-    /// Ordinate.
     pub y: Interval,
     /// Text at the point; empty for none.
     pub label: String,

@@ -251,7 +251,6 @@ fn optional_cell(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| number(value, 3))
 }
 
-/// Every figure of one scene.
 pub fn figures(report: &Report, scene: &str) -> String {
     let own: Vec<&Summary> =
         report.summaries.iter().filter(|summary| summary.scene == scene).collect();

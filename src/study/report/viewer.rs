@@ -8,7 +8,6 @@ use super::{
 };
 use crate::study::{falsecolour::Scale, plan::Rule, runs::StudiedScene};
 
-/// Steps of the false-colour legend.
 const RAMP_STEPS: u32 = 16;
 
 /// Name of a picture's class in the style sheet.
@@ -165,7 +164,6 @@ pub(crate) fn picture_group(
     html + "</div>"
 }
 
-/// Legend of the false colours.
 fn ramp(scale: Scale) -> String {
     let colours: Vec<String> = (0..=RAMP_STEPS)
         .map(|step| {

@@ -20,13 +20,11 @@ pub(crate) const SUSPICIOUS_DEVIATION: f64 = 4.0;
 /// One sampler in one scene under one rule, over all seeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
-    /// Scene's name.
     pub scene: String,
     /// Contender's label.
     pub sampler: String,
     /// Rule that ended the runs, or a number of samples on the way.
     pub rule: Rule,
-    /// Runs.
     pub runs: usize,
     /// Mean samples per pixel.
     pub spp: f64,
@@ -215,7 +213,6 @@ fn summary(
 /// Error after some samples, over all seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CurvePoint {
-    /// Samples per pixel.
     pub spp: u32,
     /// Mean wall time of the passes, seconds.
     pub seconds: f64,
@@ -232,7 +229,6 @@ pub struct CurvePoint {
 /// Error of one sampler in one scene against samples and time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Curve {
-    /// Scene's name.
     pub scene: String,
     /// Contender's label.
     pub sampler: String,

@@ -72,7 +72,6 @@ pub(crate) struct Worker {
     scene: Scene,
     /// The device, opened for the display.
     device: Arc<Device>,
-    /// Settings of the first renderer.
     settings: Settings,
     /// Samples per pixel at which a film is finished.
     spp: u32,
@@ -239,7 +238,6 @@ impl Worker {
         self.sides().any(|side| side.session.renderer.is_stopped())
     }
 
-    /// Width and height of the whole film.
     fn whole(&self) -> [u32; 2] {
         [self.scene.film.width, self.scene.film.height]
     }
