@@ -22,7 +22,7 @@ pub struct Intersection {
 }
 
 /// Initial distance, before a ray has met anything.
-const FAR_AWAY: f32 = 3.0e38;
+pub(crate) const FAR_AWAY: f32 = 3.0e38;
 
 /// Offset of ray origins from their surface, as a share of the scene's size.
 const RAY_OFFSET_SHARE: f32 = 3.814_697_3e-6;

@@ -29,17 +29,17 @@ impl Buffer {
         name: &str,
         data: &[T],
     ) -> Result<Self> {
+        let usage = vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        let create = |size| Self::with_location(device, name, size, MemoryLocation::GpuOnly, usage);
+        Self::holding(data, create)
+    }
+
+    fn holding<T: Pod>(data: &[T], create: impl FnOnce(u64) -> Result<Self>) -> Result<Self> {
         let none = [T::zeroed()];
         let bytes: &[u8] = bytemuck::cast_slice(if data.is_empty() { &none } else { data });
-        let buffer = Self::with_location(
-            device,
-            name,
-            bytes.len() as u64,
-            MemoryLocation::GpuOnly,
-            vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
-                | vk::BufferUsageFlags::TRANSFER_SRC
-                | vk::BufferUsageFlags::TRANSFER_DST,
-        )?;
+        let buffer = create(bytes.len() as u64)?;
         buffer.upload(bytes)?;
         Ok(buffer)
     }
@@ -49,11 +49,7 @@ impl Buffer {
     /// # Errors
     /// As [`Buffer::new`].
     pub fn from_slice<T: Pod>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
-        let none = [T::zeroed()];
-        let bytes: &[u8] = bytemuck::cast_slice(if data.is_empty() { &none } else { data });
-        let buffer = Self::new(device, name, bytes.len() as u64)?;
-        buffer.upload(bytes)?;
-        Ok(buffer)
+        Self::holding(data, |size| Self::new(device, name, size))
     }
 
     /// Creates a storage buffer filled with zeros.

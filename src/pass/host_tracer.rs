@@ -19,7 +19,10 @@ use super::{
     passages::{Chances, OpenPassages, Passages},
 };
 use crate::{
-    accel::{Accel, traverse::moved_off_surface},
+    accel::{
+        Accel,
+        traverse::{FAR_AWAY, moved_off_surface},
+    },
     error::Result,
     gpu::{
         Buffer, DescriptorSet, Embree,
@@ -33,8 +36,6 @@ use crate::{
     },
 };
 
-/// Distance up to which hits count, as in `bvh.glsl`.
-const FAR_AWAY: f32 = 3.0e38;
 /// Most and least paths that a thread takes at a time, and its turns where there are more.
 const MOST_PATHS: usize = 1024;
 const LEAST_PATHS: usize = 64;

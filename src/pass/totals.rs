@@ -41,12 +41,18 @@ pub struct Totals {
 impl Totals {
     /// Adds the counts of the device.
     pub(crate) fn add(&mut self, counters: &Counters) {
-        self.camera_rays += u64::from(counters.camera_rays);
-        self.bounce_rays += u64::from(counters.bounce_rays);
-        self.shadow_rays_traced += u64::from(counters.shadow_rays_traced);
-        self.shadow_rays_visible += u64::from(counters.shadow_rays_visible);
-        self.dropped_samples += u64::from(counters.dropped_samples);
-        self.traversal_overruns += u64::from(counters.traversal_overruns);
+        macro_rules! count {
+            ($($name:ident),*) => { $(self.$name += u64::from(counters.$name);)* };
+        }
+        count!(camera_rays, bounce_rays, shadow_rays_traced, shadow_rays_visible, dropped_samples);
+        count!(
+            traversal_overruns,
+            product_hits,
+            lobes_kept,
+            energy_kept,
+            cache_entries,
+            cdf_rebuilds
+        );
         if counters.traversal_overruns > 0 {
             let [left, top] = [!counters.overrun_left, !counters.overrun_top];
             let new = [left, top, counters.overrun_right, counters.overrun_bottom];
@@ -54,11 +60,6 @@ impl Totals {
             self.overrun_pixels =
                 Some([a.min(new[0]), b.min(new[1]), c.max(new[2]), d.max(new[3])]);
         }
-        self.product_hits += u64::from(counters.product_hits);
-        self.lobes_kept += u64::from(counters.lobes_kept);
-        self.energy_kept += u64::from(counters.energy_kept);
-        self.cache_entries += u64::from(counters.cache_entries);
-        self.cdf_rebuilds += u64::from(counters.cdf_rebuilds);
     }
 
     /// Rays of every kind.

@@ -35,22 +35,16 @@ fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "fit".to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
 
-fn warn(warnings: &[String]) {
-    for warning in warnings {
-        log::warn!("{warning}");
-    }
-}
-
 /// Loads a map, or the environment of a scene; derives a name for files, and tells which were read.
 pub(super) fn environment(path: &Path) -> Result<(EnvironmentMap, String, Vec<PathBuf>)> {
     if extension(path) == "toml" {
         let scene = Scene::load(path)?;
-        warn(&scene.warnings);
+        scene.warnings.iter().for_each(|warning| log::warn!("{warning}"));
         return Ok((scene.environment, format!("{}_environment", scene.name), scene.inputs));
     }
     let mut warnings = Vec::new();
     let map = EnvironmentMap::load(path, 1.0, &mut warnings)?;
-    warn(&warnings);
+    warnings.iter().for_each(|warning| log::warn!("{warning}"));
     Ok((map, stem(path), vec![path.into()]))
 }
 
@@ -77,7 +71,7 @@ pub(super) fn material(text: &str) -> Result<Source> {
     }
     if MEASURED.contains(&extension(path).as_str()) {
         let table = MeasuredTable::load(path)?;
-        warn(&table.warnings);
+        table.warnings.iter().for_each(|warning| log::warn!("{warning}"));
         let kind = MaterialKind::Measured { path: path.to_path_buf(), table: table.into() };
         let tables = MaterialTables::new(&[Material::new(stem(path), kind)])?;
         return Ok(Source { name: stem(path), tables, inputs: vec![path.into()] });

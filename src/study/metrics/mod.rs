@@ -24,6 +24,8 @@
 pub mod flip;
 pub mod parts;
 
+use std::ops::Range;
+
 use crate::{
     error::{Error, Result},
     film::RgbImage,
@@ -150,6 +152,18 @@ struct MeanReference {
     pixels: Vec<[f64; 3]>,
 }
 
+impl MeanReference {
+    fn grey(&self) -> Vec<f64> {
+        self.pixels.iter().map(|pixel| pixel.iter().sum::<f64>() / 3.0).collect()
+    }
+
+    /// Returns the columns and rows of the box around a pixel that are inside the image.
+    fn around(&self, index: usize) -> [Range<usize>; 2] {
+        [(index % self.width, self.width), (index / self.width, self.height)]
+            .map(|(centre, end)| centre.saturating_sub(RADIUS)..(centre + RADIUS + 1).min(end))
+    }
+}
+
 fn mean_picture(first: &RgbImage, second: &RgbImage) -> MeanReference {
     let mean = |(a, b): (&[f32; 3], &[f32; 3])| {
         std::array::from_fn(|channel| 0.5 * (f64::from(a[channel]) + f64::from(b[channel])))
@@ -195,29 +209,17 @@ pub fn relative_squared_errors(
 /// Divides errors by `L² + 0.01·L̄²`. If a black reference makes that 0, an error of 0 stays 0 and
 /// any other becomes infinite.
 fn relative_errors(squared: &[f64], reference: &MeanReference) -> Vec<f64> {
-    let grey: Vec<f64> =
-        reference.pixels.iter().map(|pixel| pixel.iter().sum::<f64>() / 3.0).collect();
+    let grey = reference.grey();
     let image_mean = grey.iter().sum::<f64>() / grey.len() as f64;
     let floor = RELATIVE_FLOOR * image_mean * image_mean;
-    let filtered = box_filter(&grey, reference.width, reference.height);
-    let relative = |(&error, local): (&f64, f64)| {
+    let relative = |(index, &error): (usize, &f64)| {
+        let [columns, rows] = reference.around(index);
+        let count = (rows.len() * columns.len()) as f64;
+        let row = |y: usize| grey[y * reference.width..][columns.clone()].iter().sum::<f64>();
+        let local = rows.map(row).sum::<f64>() / count;
         if error == 0.0 { 0.0 } else { error / (local * local + floor) }
     };
-    squared.iter().zip(filtered).map(relative).collect()
-}
-
-/// Averages, for every pixel, those of the 5×5 pixels around it that are inside the image.
-fn box_filter(values: &[f64], width: usize, height: usize) -> Vec<f64> {
-    let around =
-        |centre: usize, end: usize| centre.saturating_sub(RADIUS)..(centre + RADIUS + 1).min(end);
-    let mean_at = |index: usize| {
-        let rows = around(index / width, height);
-        let columns = around(index % width, width);
-        let count = (rows.len() * columns.len()) as f64;
-        let sum: f64 = rows.map(|y| values[y * width..][columns.clone()].iter().sum::<f64>()).sum();
-        sum / count
-    };
-    (0..values.len()).map(mean_at).collect()
+    squared.iter().enumerate().map(relative).collect()
 }
 
 fn check(picture: &RgbImage, first: &RgbImage, second: &RgbImage) -> Result<()> {

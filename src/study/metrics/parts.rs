@@ -11,7 +11,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Errors, MeanReference, RADIUS, RELATIVE_FLOOR, mean_picture, squared_errors};
+use super::{Errors, MeanReference, RELATIVE_FLOOR, mean_picture, squared_errors};
 use crate::{error::Result, film::RgbImage};
 
 /// Share of a part's pixels that are not brighter than the limit of its mean.
@@ -64,21 +64,18 @@ impl PartErrors {
 
 /// `L² + 0.01·M²` of every pixel of a part; 0.01·M² elsewhere.
 fn denominators(reference: &MeanReference, is_inside: &[bool]) -> Vec<f64> {
-    let (width, height) = (reference.width, reference.height);
-    let grey: Vec<f64> =
-        reference.pixels.iter().map(|pixel| pixel.iter().sum::<f64>() / 3.0).collect();
+    let (width, grey) = (reference.width, reference.grey());
     let mut own: Vec<f64> =
         grey.iter().zip(is_inside).filter(|(_, inside)| **inside).map(|(g, _)| *g).collect();
     own.sort_unstable_by(f64::total_cmp);
     let index = ((own.len() as f64 * CLAMP_SHARE).ceil() as usize).max(1) - 1;
     let limit = own.get(index).copied().unwrap_or(0.0);
     let mean = own.iter().map(|g| g.min(limit)).sum::<f64>() / own.len().max(1) as f64;
-    let around =
-        |centre: usize, end: usize| centre.saturating_sub(RADIUS)..(centre + RADIUS + 1).min(end);
     let local = |index: usize| {
         let (mut sum, mut count) = (0.0, 0.0_f64);
-        for y in around(index / width, height) {
-            for x in around(index % width, width).filter(|x| is_inside[y * width + x]) {
+        let [columns, rows] = reference.around(index);
+        for y in rows {
+            for x in columns.clone().filter(|x| is_inside[y * width + x]) {
                 sum += grey[y * width + x];
                 count += 1.0;
             }
