@@ -1,5 +1,4 @@
-//! Ray rates: times the passes of a render, and obvhs's CPU traversal of the same tree with the
-//! same rays.
+//! Ray rates: times the passes of a render, and obvhs's CPU traversal of the same tree with the same rays.
 //!
 //! One wave over the whole film goes through `camera`, `trace`, `sample`, `shadow`, `bounce` and
 //! `trace`. The rays are read back and given to obvhs on every core. Device and CPU take turns, so

@@ -59,10 +59,9 @@
 //!
 //! # Notation
 //!
-//! Directions point away from the surface; `outgoing_direction` leads to the viewer,
-//! `incident_direction` to the light; names that end in `_local` are in the shading frame, whose
-//! z axis is the shading normal. Densities (`pdf`) are per steradian unless named otherwise.
-//! Radiance is linear Rec.709.
+//! Directions point away from the surface; `outgoing_direction` leads to the viewer, `incident_direction` to
+//! the light; names that end in `_local` are in the shading frame, whose z axis is the shading normal.
+//! Densities (`pdf`) are per steradian unless named otherwise. Radiance is linear Rec.709.
 //!
 //! # Bibliography
 //!

@@ -14,8 +14,7 @@ macro_rules! say {
 }
 pub(crate) use say;
 
-/// See [`say!`]. `eprintln!` would panic where standard error is a closed pipe or terminal, or a full
-/// disk.
+/// See [`say!`]. `eprintln!` would panic where standard error is a closed pipe or terminal, or a full disk.
 pub(crate) fn say_line(line: Arguments<'_>) {
     let line = message(&line.to_string()) + "\n";
     io::stderr().lock().write_all(line.as_bytes()).ok();

@@ -1,8 +1,7 @@
 //! Triangles and instances → compressed wide BVH → flat arrays for the GPU.
 //!
-//! The tree is obvhs's CWBVH: eight children per node, their boxes quantised to 8 bits per plane,
-//! 80 bytes a node. \[Ylitie et al. 2017\]; binary tree by clustering and reinsertion, \[Meister &
-//! Bittner 2018\].
+//! The tree is obvhs's CWBVH: eight children per node, their boxes quantised to 8 bits per plane, 80 bytes a
+//! node. \[Ylitie et al. 2017\]; binary tree by clustering and reinsertion, \[Meister & Bittner 2018\].
 //!
 //! A scene without instances is one tree over its triangles. One with instances has a tree over them
 //! before the trees of their meshes, each in the space of its mesh ([`instances`]).

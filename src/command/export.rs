@@ -15,9 +15,8 @@ use crate::{
 pub struct Arguments {
     /// Scene file (.toml).
     pub scene: PathBuf,
-    /// Folder, in which the scene is called `scene`, or file with the format's extension (.xml,
-    /// .pbrt or .gltf).
-    /// Meshes, images and the environment go into a folder of the same name beside it.
+    /// Folder, in which the scene is called `scene`, or file with the format's extension (.xml, .pbrt or
+    /// .gltf). Meshes, images and the environment go into a folder of the same name beside it.
     pub output: PathBuf,
     /// Format to write.
     #[arg(long, value_enum)]

@@ -43,8 +43,7 @@ pub struct Arguments {
     /// Report folder; an interrupted study continues there.
     #[arg(short, long, value_name = "FOLDER", default_value = "report", help_heading = OUTPUT)]
     pub output: PathBuf,
-    /// Samplers to compare; ratios are relative to the first. Parameters follow colons:
-    /// mis,ris:candidates=8.
+    /// Samplers to compare; ratios are relative to the first. Parameters follow colons: mis,ris:candidates=8.
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = SAMPLING)]
     pub samplers: Option<Vec<String>>,
     /// Compare at these numbers of samples per pixel.
@@ -94,8 +93,7 @@ pub struct Arguments {
     /// Parameter for all samplers; `--set help` lists them. May be repeated.
     #[arg(long, value_name = "KEY=VALUE", help_heading = SAMPLING)]
     pub set: Vec<String>,
-    /// Run a small, fast version: the study file's quick settings, or an 80x60 film and few
-    /// samples.
+    /// Run a small, fast version: the study file's quick settings, or an 80x60 film and few samples.
     #[arg(long, help_heading = STOPPING)]
     pub quick: bool,
     /// Discard finished runs in the folder that were made under other conditions.
@@ -118,9 +116,8 @@ pub struct Arguments {
 /// Runs a study.
 ///
 /// # Errors
-/// Wrong options, an unusable scene, study file or reference, a folder that holds something else,
-/// no device, a failing device or disk; [`Error::Interrupted`] after Ctrl-C. Finished runs are
-/// always kept.
+/// Wrong options, an unusable scene, study file or reference, a folder that holds something else, no device,
+/// a failing device or disk; [`Error::Interrupted`] after Ctrl-C. Finished runs are always kept.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let interrupt = Interrupt::listen();
     interrupt.wait_for_caller();

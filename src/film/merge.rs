@@ -1,8 +1,7 @@
 //! Combines renders of one scene made with different seeds, sample ranges or windows into one.
 //!
-//! Checkpoints merge exactly, by adding their sums. Images merge by averaging their means, weighted
-//! by sample count, which equals one run up to rounding. Windows of the same samples are joined pixel by
-//! pixel.
+//! Checkpoints merge exactly, by adding their sums. Images merge by averaging their means, weighted by sample
+//! count, which equals one run up to rounding. Windows of the same samples are joined pixel by pixel.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

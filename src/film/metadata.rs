@@ -1,8 +1,7 @@
 //! Metadata of a render, stored as attributes of its image file.
 //!
-//! `samplesPerPixel` and `renderTimeSeconds` are pbrt's names, `generatedBy` is Mitsuba's; the rest
-//! is under `fenestra.`. [`Metadata::sample_ranges`] keep `merge` and `--resume` from counting a
-//! sample twice.
+//! `samplesPerPixel` and `renderTimeSeconds` are pbrt's names, `generatedBy` is Mitsuba's; the rest is under
+//! `fenestra.`. [`Metadata::sample_ranges`] keep `merge` and `--resume` from counting a sample twice.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

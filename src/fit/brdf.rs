@@ -1,9 +1,8 @@
 //! BRDF × cosine → mixtures of lobes in the local frame, one per view elevation.
 //!
-//! View `v` of n stands at `θ = (v + ½)/n · 90°` from the normal, toward +x; an isotropic BRDF
-//! needs no azimuth. Lobes of equal index correspond between views: each view starts from its
-//! neighbour's lobes, turned with the mirror direction as far as they are narrow, so that
-//! [`BrdfFit::lobes_at`] can interpolate.
+//! View `v` of n stands at `θ = (v + ½)/n · 90°` from the normal, toward +x; an isotropic BRDF needs no
+//! azimuth. Lobes of equal index correspond between views: each view starts from its neighbour's lobes,
+//! turned with the mirror direction as far as they are narrow, so that [`BrdfFit::lobes_at`] can interpolate.
 
 use std::{f64::consts::FRAC_PI_2, time::Instant};
 

@@ -70,8 +70,7 @@ pub fn write_fit(path: &Path, fit: &Fit) -> Result<()> {
 /// Reads a fit file.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read; [`Error::Format`] if it is no fit file, of another version
-/// or damaged.
+/// [`Error::Io`] if it cannot be read; [`Error::Format`] if it is no fit file, of another version or damaged.
 pub fn read_fit(path: &Path) -> Result<Fit> {
     let bytes = files::read(path)?;
     let fail = |message: String| Error::format(path, message);

@@ -57,8 +57,7 @@ pub(crate) const VIEW_TOLERANCE: f64 = 1e-6;
 /// Bandwidth at which a lobe follows the mirror direction half the way from view to view; narrower
 /// lobes follow further.
 pub(crate) const FOLLOWING_BANDWIDTH: f64 = 20.0;
-/// Largest angle between normal and view, degrees, in summary figures. Grazing views are listed
-/// separately.
+/// Largest angle between normal and view, degrees, in summary figures. Grazing views are listed separately.
 pub(crate) const SUMMARY_ANGLE_DEG: f64 = 60.0;
 
 /// Objective of a fit.

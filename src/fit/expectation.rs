@@ -87,9 +87,8 @@ fn responsibilities(blocks: &[Block], point: Point, row: &mut [Lanes]) -> f32 {
 }
 
 /// Computes `exp(x)` for −40 ≤ x ≤ 80 with a relative error of a few 1e-7, in a form that compilers
-/// vectorize: 2ⁿ from the exponent bits, the rest from a polynomial. Above 80 it stays at e⁸⁰,
-/// below −40 at e⁻⁴⁰: negligible, yet products with it avoid denormal numbers, which are a hundred
-/// times slower.
+/// vectorize: 2ⁿ from the exponent bits, the rest from a polynomial. Above 80 it stays at e⁸⁰, below −40 at
+/// e⁻⁴⁰: negligible, yet products with it avoid denormal numbers, which are a hundred times slower.
 #[inline]
 pub(crate) fn fast_exp(x: f32) -> f32 {
     /// 1.5·2²³: adding it rounds to an integer in the lowest bits.

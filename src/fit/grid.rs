@@ -91,8 +91,7 @@ impl Grid {
         self.radiance[y * self.width + x]
     }
 
-    /// Radiance at a point in cell coordinates, bilinear between cell centres as in the renderer's
-    /// lookup.
+    /// Radiance at a point in cell coordinates, bilinear between cell centres as in the renderer's lookup.
     pub(crate) fn lookup(&self, x: f64, y: f64) -> Vec3 {
         let (left, top) = ((x - 0.5).floor(), (y - 0.5).floor());
         let (u, v) = ((x - 0.5 - left) as f32, (y - 0.5 - top) as f32);

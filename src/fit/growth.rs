@@ -96,8 +96,7 @@ fn principal(covariance: DMat3, axis: DVec3) -> (f64, DVec3, f64) {
     (middle + radius, angle.cos() * tangent + angle.sin() * bitangent, (middle - radius).max(0.0))
 }
 
-/// Splits the `count` lobes with the most divergence along their longest extent. Appends the second
-/// halves.
+/// Splits the `count` lobes with the most divergence along their longest extent. Appends the second halves.
 fn split(points: &PointSet, components: &mut Vec<Component>, count: usize) {
     let held = holdings(points, components);
     let mut order: Vec<usize> = (0..components.len()).collect();

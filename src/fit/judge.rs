@@ -30,8 +30,7 @@ pub struct FitErrors {
 }
 
 impl FitErrors {
-    /// Computes the figures from integrals of (L − F)², L², p²/q, p ln(p/f) and F, and `energy`,
-    /// that of L.
+    /// Computes the figures from integrals of (L − F)², L², p²/q, p ln(p/f) and F, and `energy`, that of L.
     fn from_sums(sums: [f64; 5], energy: f64) -> Self {
         let [difference, square, second_moment, divergence, fitted] = sums;
         Self {

@@ -1,9 +1,8 @@
 //! Pictures of fits: data, fit and difference side by side.
 //!
-//! Maps are lat-long. BRDFs are disks, one row per view: the hemisphere seen from above in
-//! orthographic projection, the normal at the centre, the horizon at the rim, the view toward the
-//! right. Data and fit share one exposure; the difference fit − data runs from blue (too little)
-//! over white to red (too much).
+//! Maps are lat-long. BRDFs are disks, one row per view: the hemisphere seen from above in orthographic
+//! projection, the normal at the centre, the horizon at the rim, the view toward the right. Data and fit
+//! share one exposure; the difference fit − data runs from blue (too little) over white to red (too much).
 
 use std::path::Path;
 

@@ -91,9 +91,8 @@ impl Commands {
         Ok(commands)
     }
 
-    /// Records one pass: a compute dispatch of at least `invocations` invocations that sees all
-    /// writes of earlier passes. It is labelled with the pipeline's name and, in a timed command
-    /// buffer, timed.
+    /// Records one pass: a compute dispatch of at least `invocations` invocations that sees all writes of
+    /// earlier passes. It is labelled with the pipeline's name and, in a timed command buffer, timed.
     ///
     /// Binds those of `sets` that the shader uses; `push_constants` may be empty.
     ///

@@ -224,9 +224,8 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: every object made from the device holds it in an `Arc`, so only those destroyed
-        // here are left, and they go before the device; the queue is idle, since every submission
-        // is waited for.
+        // SAFETY: every object made from the device holds it in an `Arc`, so only those destroyed here are
+        // left, and they go before the device; the queue is idle, since every submission is waited for.
         unsafe {
             drop(self.allocator().take());
             self.set_layouts.destroy(&self.raw);

@@ -1,6 +1,5 @@
-//! Mathematics that several stages share: that of scenes (frames, random numbers, colour, a square map of
-//! the sphere), packed directions, alias tables, the order of refinement and
-//! medians.
+//! Mathematics that several stages share: that of scenes (frames, random numbers, colour, a square map of the
+//! sphere), packed directions, alias tables, the order of refinement and medians.
 
 pub mod alias;
 pub mod octahedron;

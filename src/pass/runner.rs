@@ -66,8 +66,7 @@ pub struct Runner {
 }
 
 impl Runner {
-    /// Allocates the film of `scene` and waves over it. Fails if the device does or its limits are
-    /// exceeded.
+    /// Allocates the film of `scene` and waves over it. Fails if the device does or its limits are exceeded.
     pub(crate) fn new(
         device: &Arc<Device>,
         scene: Arc<SceneBuffers>,

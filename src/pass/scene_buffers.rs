@@ -167,8 +167,7 @@ impl SceneBuffers {
         Ok(Self { set, geometry, parameters, surfaces, window, light_groups, host_ms })
     }
 
-    /// Looks at the scene through another camera, on a whole film of `size` pixels. Fails if the device
-    /// does.
+    /// Looks at the scene through another camera, on a whole film of `size` pixels. Fails if the device does.
     pub(crate) fn look(&self, camera: &Camera, [width, height]: [u32; 2]) -> Result<()> {
         let parameters = SceneParameters {
             film_width: width,

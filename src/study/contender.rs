@@ -7,8 +7,7 @@ use crate::{
     sampler::{Parameters, Sampler},
 };
 
-/// A sampler with parameters, written `ris` or `ris:candidates=8` (more parameters after further
-/// colons).
+/// A sampler with parameters, written `ris` or `ris:candidates=8` (more parameters after further colons).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contender {
     /// Text it was parsed from; names it in tables and files.

@@ -403,9 +403,8 @@ impl Plan {
         })
     }
 
-    /// Lists every run of a scene in order of execution: by rule (the largest number of samples,
-    /// then the time), seed and sampler. The samplers rotate by one from seed to seed, so that none
-    /// is always first.
+    /// Lists every run of a scene in order of execution: by rule (the largest number of samples, then the
+    /// time), seed and sampler. The samplers rotate by one from seed to seed, so that none is always first.
     pub(crate) fn tasks(&self) -> Vec<(Rule, u32, &Contender)> {
         let samples = self.spp.last().copied().map(Rule::Spp);
         let contenders = &self.contenders;

@@ -1,9 +1,8 @@
 //! The mask of a scene: pixels that see surfaces alone, and those that see the environment.
 //!
-//! A few camera rays per pixel tell them apart by the film's layer of positions, which grows by that
-//! of every ray that hits something. A pixel with one ray that escapes counts as
-//! environment: its noise is that of smoothing edges. Behind glass the glass is the first hit, and
-//! the pixel counts as surface.
+//! A few camera rays per pixel tell them apart by the film's layer of positions, which grows by that of every
+//! ray that hits something. A pixel with one ray that escapes counts as environment: its noise is that of
+//! smoothing edges. Behind glass the glass is the first hit, and the pixel counts as surface.
 
 use super::{
     folder::Folder,
@@ -44,8 +43,7 @@ pub struct Parts {
 }
 
 impl Surfaces {
-    /// Reads the mask from `folder` or renders it there; `make` gives a session with the layer of
-    /// positions.
+    /// Reads the mask from `folder` or renders it there; `make` gives a session with the layer of positions.
     pub(super) fn of(
         folder: &Folder,
         scene: &Scene,

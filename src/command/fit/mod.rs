@@ -42,8 +42,7 @@ pub struct Shared {
     /// Objective that the fit minimizes.
     #[arg(long, value_enum, default_value_t)]
     pub method: Method,
-    /// Fit file to write, with a picture beside it. Default: the source's name in the working
-    /// folder.
+    /// Fit file to write, with a picture beside it. Default: the source's name in the working folder.
     #[arg(short, long, value_name = "FIT")]
     pub output: Option<PathBuf>,
     /// Neither read nor write the fit cache.

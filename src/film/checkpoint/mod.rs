@@ -1,13 +1,11 @@
 //! Checkpoints: the film's sums and the metadata of their render, as an OpenEXR file.
 //!
 //! The channels hold the sums bit for bit: `Sum.R/G/B`, `SumCompensation.R/G/B`, `Squares.R/G/B`,
-//! `Pending.R/G/B` of a stopped sweep, `UnfilteredSum.R/G/B`,
-//! `SquaresCompensation.R/G/B`, `AlbedoSum.R/G/B`, `NSum.X/Y/Z`, `PSum.X/Y/Z`, `GuideCellSum.R/G/B`,
-//! `GuideLevelSum.R/G/B`, and each count of shadow rays, cache entries and coverages as a pair of floats
-//! that add up to the integer;
-//! `GroupSum_NAME.R/G/B` and so on of each group of lights.
-//! Beside them, the picture `R`, `G`, `B` lets any viewer open the file. An attribute holds the
-//! SHA-256 of window, channels and attributes, so that damage does not pass for radiance.
+//! `Pending.R/G/B` of a stopped sweep, `UnfilteredSum.R/G/B`, `SquaresCompensation.R/G/B`, `AlbedoSum.R/G/B`,
+//! `NSum.X/Y/Z`, `PSum.X/Y/Z`, `GuideCellSum.R/G/B`, `GuideLevelSum.R/G/B`, and each count of shadow rays,
+//! cache entries and coverages as a pair of floats that add up to the integer; `GroupSum_NAME.R/G/B` and so
+//! on of each group of lights. Beside them, the picture `R`, `G`, `B` lets any viewer open the file. An
+//! attribute holds the SHA-256 of window, channels and attributes, so that damage does not pass for radiance.
 
 mod pair;
 

@@ -68,8 +68,7 @@ pub struct ArrivingLight {
 }
 
 impl ArrivingLight {
-    /// Makes room for `cells` cells; the first begin with `words` of an earlier guide, divided by
-    /// `divisor`.
+    /// Makes room for `cells` cells; the first begin with `words` of an earlier guide, divided by `divisor`.
     pub fn new(cells: usize, words: &[ArrivalWords], divisor: u32) -> Self {
         let sane = |value: f32| if value >= 0.0 { value.min(MAX_SUM) } else { 0.0 };
         let arrivals = |[rays, light]: &ArrivalWords| Arrivals {

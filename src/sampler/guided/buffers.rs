@@ -88,8 +88,7 @@ pub struct GuideBuffers {
 }
 
 impl GuideBuffers {
-    /// Splits the environment and allocates the buffers. Fails if the device does or its limits are
-    /// exceeded.
+    /// Splits the environment and allocates the buffers. Fails if the device does or its limits are exceeded.
     pub fn new(
         device: &Arc<Device>,
         scene: &Scene,
@@ -296,9 +295,8 @@ impl GuideBuffers {
         })
     }
 
-    /// Continues from a state, in its grids. Returns true if the geometry differs, so that most
-    /// counts were forgotten. [`Error::Usage`] for another environment or number of regions. Fails
-    /// if the device does.
+    /// Continues from a state, in its grids. Returns true if the geometry differs, so that most counts were
+    /// forgotten. [`Error::Usage`] for another environment or number of regions. Fails if the device does.
     pub fn restore(&mut self, state: &GuideState) -> Result<bool> {
         let (here, there) = (&self.origin, &state.origin);
         if here.environment != there.environment || there.regions > self.budget.max_regions as u32 {

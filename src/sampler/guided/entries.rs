@@ -110,9 +110,8 @@ impl<'a> EntryWriter<'a> {
     }
 }
 
-/// Whole numbers proportional to `weights` that sum to [`REGION_SCALE`], or all 0 if the weights
-/// are. Every positive weight gets at least 1: the sampler is unbiased only if it can draw the
-/// region.
+/// Whole numbers proportional to `weights` that sum to [`REGION_SCALE`], or all 0 if the weights are. Every
+/// positive weight gets at least 1: the sampler is unbiased only if it can draw the region.
 fn quantise(weights: &[f64], parts: &mut Vec<u32>) {
     parts.clear();
     let sum: f64 = weights.iter().sum();
@@ -130,10 +129,9 @@ fn quantise(weights: &[f64], parts: &mut Vec<u32>) {
     }
 }
 
-/// Splits the random numbers into as many equal intervals as there are regions and finds, for each,
-/// where to start the search: the last region that begins at or before the interval. The search of
-/// the first interval always starts at region 0, so its place holds the last region that can be
-/// drawn.
+/// Splits the random numbers into as many equal intervals as there are regions and finds, for each, where to
+/// start the search: the last region that begins at or before the interval. The search of the first interval
+/// always starts at region 0, so its place holds the last region that can be drawn.
 fn interval_starts(parts: &[u32], starts: &mut Vec<u32>) {
     let count = parts.len() as u32;
     starts.clear();

@@ -5,11 +5,10 @@
 //! al. (2008) take at every hit, averaged over the surfaces of a cell and the directions they are
 //! seen from. The cell of a flat wall has nearly one of each.
 //!
-//! A cell with few rays falls back on its surroundings as a prior: a child of a refined cell on
-//! that cell, a fine cell on its coarse cell, a coarse cell on all cells of its face, and a face on
-//! the visibility of the whole scene and a cosine. A cell tends to differ from its parent cell over
-//! whole parts of the sky, so the prior is first scaled by the ratio that the cell found in the
-//! parent region.
+//! A cell with few rays falls back on its surroundings as a prior: a child of a refined cell on that cell, a
+//! fine cell on its coarse cell, a coarse cell on all cells of its face, and a face on the visibility of the
+//! whole scene and a cosine. A cell tends to differ from its parent cell over whole parts of the sky, so the
+//! prior is first scaled by the ratio that the cell found in the parent region.
 
 use glam::Vec3;
 

@@ -14,20 +14,17 @@ use crate::sampler::{
     regions::{FACE_COUNT, Partition},
 };
 
-/// Trials of one region and cell above which its counts are halved, so that the responses fit a
-/// word.
+/// Trials of one region and cell above which its counts are halved, so that the responses fit a word.
 const MAX_TRIALS: u64 = (1 << 16) * PARTS_PER_RAY as u64;
 
 /// Least number of trials per region, on average, for a cell to be refined.
 const RAYS_TO_REFINE: u64 = 2;
-/// Least variance of the visibility of a ray, averaged over the rays of a cell, for it to be
-/// refined.
+/// Least variance of the visibility of a ray, averaged over the rays of a cell, for it to be refined.
 const MIN_VARIANCE: f64 = 0.01;
 /// Children that a refined cell is expected to have: surfaces cross half of its eight.
 const EXPECTED_CHILDREN: usize = 4;
 
-/// Cells with their counts. Rays from places without a cell of their own count in the cells of
-/// faces.
+/// Cells with their counts. Rays from places without a cell of their own count in the cells of faces.
 #[derive(Clone, Debug)]
 pub struct Guide {
     pub(super) cells: Cells,
@@ -64,13 +61,11 @@ impl Guide {
         self
     }
 
-    /// As [`Self::new`], with the keys, refined cells, counts (trials and hits in sixteenths of
-    /// rays) and shares of an earlier guide. Drops cells that find no room and divides every count
-    /// by `divisor`.
+    /// As [`Self::new`], with the keys, refined cells, counts (trials and hits in sixteenths of rays) and
+    /// shares of an earlier guide. Drops cells that find no room and divides every count by `divisor`.
     ///
     /// # Panics
-    /// As [`Self::new`]; if there are not as many counts as keys and regions, the faces first, or
-    /// shares.
+    /// As [`Self::new`]; if there are not as many counts as keys and regions, the faces first, or shares.
     pub fn resume(
         region_count: usize,
         capacity: usize,
@@ -92,9 +87,8 @@ impl Guide {
         Self { cells, counts, region_count, shares, arriving: None }
     }
 
-    /// Refines fine cells that have rays enough to tell their children apart and whose rays
-    /// disagree on visibility: those with the greatest total variance first, as long as there is
-    /// room.
+    /// Refines fine cells that have rays enough to tell their children apart and whose rays disagree on
+    /// visibility: those with the greatest total variance first, as long as there is room.
     pub fn refine(&mut self) {
         let enough = RAYS_TO_REFINE * u64::from(PARTS_PER_RAY) * self.region_count as u64;
         let variance = |cell: usize| {
@@ -214,9 +208,8 @@ impl Guide {
         }
     }
 
-    /// Replaces the counts for the regions of `from` by counts for those of `to`: each region
-    /// inherits, in proportion to energy, the counts of the regions it overlaps. Makes room for
-    /// `capacity` cells.
+    /// Replaces the counts for the regions of `from` by counts for those of `to`: each region inherits, in
+    /// proportion to energy, the counts of the regions it overlaps. Makes room for `capacity` cells.
     ///
     /// # Panics
     /// If there are more cells than that.

@@ -75,8 +75,7 @@ impl Guide {
         snapshot.table = self.cells.table(&self.brdf_shares(&tree));
     }
 
-    /// Estimates for faces, coarse cells and cells with children, parents first; empty for the
-    /// leaves.
+    /// Estimates for faces, coarse cells and cells with children, parents first; empty for the leaves.
     fn estimate_inner_cells(&self, tree: &Tree, tables: &RegionTables) -> Vec<Estimates> {
         // Sum the counts of every inner cell and its descendants
         let tallies = tree.sums(|cell| self.counts(cell).iter().map(Tally::from));

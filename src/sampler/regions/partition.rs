@@ -1,12 +1,11 @@
 //! Splits the environment into rectangles of its sampling cells, each with an exact table of its
 //! own: [`EnvironmentMap`] → [`Partition`].
 //!
-//! The cells are those of [`EnvironmentTables`](crate::scene::environment::EnvironmentTables):
-//! `height + 1` rows of `width` cells between texel centres, each with its share P_cell of the
-//! whole density. Greedy splits of the rectangle with the largest E^¼ · Ω^¾ (E its share of the
-//! energy, Ω its solid angle) give rectangles that are small where the map is bright without
-//! leaving the dark parts coarse. Later splits weight both by how much the scene sees of each
-//! region.
+//! The cells are those of [`EnvironmentTables`](crate::scene::environment::EnvironmentTables): `height + 1`
+//! rows of `width` cells between texel centres, each with its share P_cell of the whole density. Greedy
+//! splits of the rectangle with the largest E^¼ · Ω^¾ (E its share of the energy, Ω its solid angle) give
+//! rectangles that are small where the map is bright without leaving the dark parts coarse. Later splits
+//! weight both by how much the scene sees of each region.
 //!
 //! Sampling chooses a region r, then one of its cells by an alias table with P_cell / P_region,
 //! then a direction in the bilinear patch of the cell. Hence p(ω|r) = pdf(ω) / P_region with the

@@ -30,8 +30,7 @@ pub struct MapCells {
 }
 
 impl MapCells {
-    /// Cells of `map`, each with the mean luminance of its four corners × its solid angle as
-    /// energy.
+    /// Cells of `map`, each with the mean luminance of its four corners × its solid angle as energy.
     pub fn new(map: &EnvironmentMap) -> Self {
         let (width, rows) = (map.width as usize, map.height as usize + 1);
         let texel = |column: usize, row: usize| {
@@ -59,8 +58,7 @@ impl MapCells {
         Self { width, rows, energy, row_angle, azimuth, rotation_rad: f64::from(map.rotation_rad) }
     }
 
-    /// Unit mean direction of a rectangle in the world, weighted by energy, or by solid angle if it
-    /// is black.
+    /// Unit mean direction of a rectangle in the world, weighted by energy, or by solid angle if it is black.
     pub fn direction_of(&self, rectangle: Rectangle) -> DVec3 {
         let pi = std::f64::consts::PI;
         let energies = rectangle.rows().map(|row| &self.energy[rectangle.cells(row, self.width)]);
@@ -202,9 +200,8 @@ fn list_order(next: &[usize]) -> Vec<usize> {
         .collect()
 }
 
-/// Splits the whole map into `region_count` rectangles, or fewer if it runs out of cells to split.
-/// Returns them in the order of the tree, so that neighbours in that order are mostly neighbours in
-/// the map.
+/// Splits the whole map into `region_count` rectangles, or fewer if it runs out of cells to split. Returns
+/// them in the order of the tree, so that neighbours in that order are mostly neighbours in the map.
 pub fn split_greedily(sums: &SummedAreas, region_count: usize) -> Vec<Rectangle> {
     let size = [sums.cells.width, sums.cells.rows].map(|count| count as u32);
     let whole = Rectangle { first: [0, 0], size, parent: 0 };

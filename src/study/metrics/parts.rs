@@ -1,8 +1,7 @@
 //! Errors over a part of the picture: lit surfaces, or where the camera sees the environment.
 //!
-//! A sun in the frame outshines everything, so that figures of the whole picture measure how its
-//! disc is smoothed. Over a part P of the pixels, with `e` the squared error and `g` the reference's
-//! mean over RGB:
+//! A sun in the frame outshines everything, so that figures of the whole picture measure how its disc is
+//! smoothed. Over a part P of the pixels, with `e` the squared error and `g` the reference's mean over RGB:
 //!
 //! `relmse` = mean over P of `e / (L² + 0.01·M²)`, where `L` is the mean of `g` over those of the
 //! 5×5 pixels around that belong to P, and `M` the mean over P of `min(g, q)` with `q` the 99th

@@ -1,8 +1,7 @@
 //! The page of a study, `index.html`: one file that needs no network.
 //!
-//! Text, tables and plots work without JavaScript; `page.js` adds the viewer (two overlaid
-//! pictures, one zoom and pan for all pictures of a scene). Colours follow the reader's choice of
-//! light or dark (`page.css`).
+//! Text, tables and plots work without JavaScript; `page.js` adds the viewer (two overlaid pictures, one zoom
+//! and pan for all pictures of a scene). Colours follow the reader's choice of light or dark (`page.css`).
 
 mod curves;
 mod html;

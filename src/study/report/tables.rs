@@ -1,5 +1,4 @@
-//! Tables of the page: ratios at a glance, published figures beside ours, every figure of a scene,
-//! overheads.
+//! Tables of the page: ratios at a glance, published figures beside ours, every figure of a scene, overheads.
 
 use std::collections::BTreeSet;
 

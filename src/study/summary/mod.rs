@@ -221,8 +221,7 @@ pub struct CurvePoint {
     pub rmse: Interval,
     /// Trimmed relMSE over lit surfaces, likewise; absent if it is not judged.
     pub relmse: Option<Interval>,
-    /// 1 / (that figure × seconds of each run), likewise: it stays level while error falls as
-    /// 1/time.
+    /// 1 / (that figure × seconds of each run), likewise: it stays level while error falls as 1/time.
     pub efficiency: Option<Interval>,
 }
 
