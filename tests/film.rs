@@ -192,6 +192,10 @@ fn the_first_blocks_have_the_samples_of_a_stopped_sweep() {
     sums.albedo = (0..192).map(|pixel| [0.5 * sums.samples(pixel) as f32; 3]).collect();
     let albedo = &sums.to_image(&[Aov::Albedo]).channels["Albedo.G"];
     assert!(albedo.iter().all(|albedo| *albedo == 0.5), "{albedo:?}");
+    let covered = |pixel| [[7, sums.samples(pixel)], [0; 2], [0; 2], [0; 2], [0; 2], [0; 2]];
+    sums.objects = (0..192).map(covered).collect();
+    let shares = &sums.to_image(&[Aov::CryptoObject]).channels["CryptoObject00.G"];
+    assert!(shares.iter().all(|share| *share == 1.0), "{shares:?}");
     // A group of lights brings a quarter of it.
     let quarter = |of: &[[f32; 3]]| of.iter().map(|value| value.map(|v| 0.25 * v)).collect();
     let group = GroupSums {

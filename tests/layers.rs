@@ -231,10 +231,15 @@ fn cache_entries_are_those_of_the_statistics() {
 fn visible_rays_are_those_of_the_statistics() {
     let _alone = support::alone();
     let settings = Settings { depth: 2, aovs: vec![Aov::Visible], ..Settings::default() };
-    let (sums, totals) = render(&room(), settings, 3);
+    let (sums, totals) = render(&room(), settings.clone(), 3);
     let [visible, traced] = total(&sums.visible);
     assert_eq!([visible, traced], [totals.shadow_rays_visible, totals.shadow_rays_traced]);
     assert!(0 < visible && visible < traced, "{visible} of {traced}");
+    // Rays of training are in the statistics alone: two vertices of a pixel have eight rays each, at most.
+    let settings = Settings { sampler: Sampler::Guided, ..settings };
+    let (sums, totals) = render(&room(), settings, 3);
+    assert!(sums.visible.iter().all(|pair| pair[1] <= 3 * 2 * 8), "{:?}", sums.visible[0]);
+    assert!(total(&sums.visible)[1] < totals.shadow_rays_traced);
 }
 
 #[test]

@@ -462,6 +462,12 @@ fn bent_normals_let_no_light_through() {
     let (sine, cosine) = 15_f32.to_radians().sin_cos();
     scene.geometry.normals.fill([0.0, cosine, -sine]);
     assert_channels("bent", &scene, 1, 1e-4, |_| DVec3::ZERO);
+    // A pane reflects what it does not let through, both by its triangles.
+    let mut pane = scene.clone();
+    pane.materials[0] = Material::new("pane", glass(Vec3::ONE));
+    pane.geometry.normals.fill([0.0, cosine, sine]);
+    pane.environment = scenes::environment(64, |_| Vec3::ONE);
+    assert_channels("pane", &pane, 1, 1e-4, |_| DVec3::ONE);
     scene.materials[0] = scenes::diffuse(Vec3::ONE);
     scene.geometry.normals.fill([0.64, 0.77, 0.0]);
     scene.environment = scenes::environment(64, |to| if to.y > -0.2 { SKY } else { GROUND });

@@ -328,15 +328,20 @@ mod tests {
         };
         let text = "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 40\n\
                     [[lamp]]\ntype = \"point\"\nposition = [0, 3, 0]\nintensity = [3, 3, 3]\n\
+                    light_group = \"a\"\n\
                     [[lamp]]\ntype = \"spot\"\nposition = [0, 3, 0]\ndirection = [0, -1, 0]\n\
                     intensity = [12, 12, 12]\ninner_angle_deg = 0\nouter_angle_deg = 90\n\
-                    [[lamp]]\ntype = \"directional\"\ndirection = [0, -1, 0]\nirradiance = [4, 4, 4]\n"
+                    light_group = \"b\"\n\
+                    [[lamp]]\ntype = \"directional\"\ndirection = [0, -1, 0]\nirradiance = [4, 4, 4]\n\
+                    light_group = \"c\"\n"
             .to_owned()
             + &square("one", "", 0.0)
             + &square("two", "emission_two_sided = true", 4.0);
         let scene = Scene::parse(Path::new("a.toml"), &text).unwrap();
         let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
         let tables = LampTables::new(&scene, &accel, &LightGroups::new(&scene));
+        // After the environment's.
+        assert!(tables.lamps.iter().map(|lamp| lamp.light_group).eq(1..4), "{:?}", tables.lamps);
         let mut drawn = [0.0; 5];
         for choice in &tables.choices {
             let index = match choice.source {

@@ -19,7 +19,7 @@ use fenestra_scene::{
         rgl::AdaptiveBrdf,
     },
 };
-use glam::{DVec3, Vec2, Vec3, dvec3};
+use glam::{DQuat, DVec3, Vec2, Vec3, dvec3};
 
 use crate::support::{
     assert_contains,
@@ -96,9 +96,11 @@ fn values_are_those_of_mitsuba_and_near_the_surface_itself() {
     }
 }
 
-/// Fails unless the table holds the measurement: in total within 0.5%, and each pair within `most`.
+/// Fails unless the table holds the measurement: in total within 0.5%, each pair within `most`, and turned
+/// about the normal within half a degree.
 fn assert_holds(table: &MeasuredTable, brdf: &AdaptiveBrdf, most: f64) {
     let (mut in_table, mut in_file) = (DVec3::ZERO, DVec3::ZERO);
+    let mut turn = [0.0; 2];
     for index in 0..4000 {
         let part = |step: f64| (f64::from(index) * step).fract();
         let above = |u: f64, v: f64| direction(u * 1.4, v * TAU);
@@ -110,8 +112,17 @@ fn assert_holds(table: &MeasuredTable, brdf: &AdaptiveBrdf, most: f64) {
             let angles = half_difference_angles(out, into);
             found *= measured_turn(table.words(), 0, angles, out + into, Vec2::X).as_dvec3();
         }
-        let both = brdf.reflected(wi, wo) + brdf.reflected(wo, wi);
-        let expected = both / (wi.z + wo.z);
+        let turned = |degrees: f64| {
+            let turn = DQuat::from_rotation_z(degrees.to_radians());
+            let (wi, wo) = (turn * wi, turn * wo);
+            (brdf.reflected(wi, wo) + brdf.reflected(wo, wi)) / (wi.z + wo.z)
+        };
+        let expected = turned(0.0);
+        if table.has_turns() {
+            let slope = 0.5 * (turned(1.0) - turned(-1.0)) / expected;
+            turn[0] += (found / expected - 1.0).dot(slope);
+            turn[1] += slope.length_squared();
+        }
         let error = (found / expected - 1.0).abs().max_element();
         assert!(error < most, "{wi}, {wo}: {found}, expected {expected}");
         in_table += found * wi.z * wo.z;
@@ -119,6 +130,8 @@ fn assert_holds(table: &MeasuredTable, brdf: &AdaptiveBrdf, most: f64) {
     }
     let error = (in_table / in_file - 1.0).abs().max_element();
     assert!(error < 0.005, "{in_table}, expected {in_file}");
+    let degrees = turn[0] / turn[1].max(f64::MIN_POSITIVE);
+    assert!(degrees.abs() < 0.5, "turned by {degrees} degrees");
 }
 
 /// A brushed surface turns with its tangent, and without a turn is the mean over all. Its two ends differ, by

@@ -86,6 +86,37 @@ fn lists_and_estimates_have_closed_forms() {
     }
 }
 
+/// A pane at a height of 1 m, and a wall above it at 2.5 m.
+#[test]
+fn a_wall_beyond_a_lamp_behind_a_pane_hides_nothing() {
+    let part = |name: &str, kind: &str, height: f32| {
+        format!(
+            "[[material]]\nname = \"{name}\"\n{kind}\n[[object]]\nshape = \"box\"\nsize = [2, 1e-3, 2]\n\
+             material = \"{name}\"\ntranslate = [0, {height}, 0]\n"
+        )
+    };
+    let text = "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 40\n"
+        .to_owned()
+        + &part("pane", "type = \"thin_dielectric\"", 1.0)
+        + &part("wall", "type = \"diffuse\"\nreflectance = [0, 0, 0]", 2.5);
+    let scene = Scene::parse(Path::new("a.toml"), &text).unwrap();
+    let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
+    let survey = Survey {
+        accel: &accel,
+        tables: &LampTables::default(),
+        passes: vec![true, false],
+        two_sided: vec![false; 2],
+        radius: 1.0,
+        offset: accel.ray_offset(),
+    };
+    // The origin moves to the pane.
+    for (farthest, is_hidden) in [(2.0, false), (3.0, true)] {
+        let mut origin = Vec3::ZERO;
+        let met = survey.stops(&mut origin, Vec3::Y, farthest);
+        assert_eq!((met.is_some(), origin.y > 1.0), (is_hidden, true), "{farthest} m");
+    }
+}
+
 #[test]
 fn every_cell_and_face_has_its_own_index() {
     let grid = Grid { size: [2, 3, 4], ..Grid::default() };

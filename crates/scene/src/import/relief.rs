@@ -118,3 +118,29 @@ fn normals(heights: &TextureUse, images_per_unit: Vec2) -> TextureUse {
     let texels = Texels::Halves((0..values.len()).into_par_iter().map(texel).collect());
     heights.clone().showing(Arc::new(Texture { name: name.clone(), width, height, texels }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{instance::Instance, material::MaterialKind, quadrics, transform::Transform};
+
+    /// A square of 2 × 2 units under an image, stretched to 4 × 6: placed, and as an instance.
+    #[test]
+    fn images_spread_over_instances_as_over_what_is_placed() {
+        let texels = Texels::Halves(vec![[f16::ONE; 4]]);
+        let texture = Texture { name: "heights".into(), width: 1, height: 1, texels };
+        let reflectance = Vec3::splat(0.5);
+        let mut material = Material::new("bumpy", MaterialKind::Diffuse { reflectance });
+        material.surface.normal = Some(TextureUse::new(Arc::new(texture)));
+        let stretch = Transform::new([2.0, 3.0, 1.0], [0.0; 3], [0.0; 3]);
+        let (mut placed, mut instanced) = (Geometry::default(), Geometry::default());
+        placed.append(&quadrics::rectangle(), &stretch, |_| 0);
+        let (prototype, _) = instanced.add_prototype(&quadrics::rectangle(), |_| 0);
+        instanced.instances.extend(Instance::new(prototype.index, &stretch, 0, true));
+        for geometry in [placed, instanced] {
+            let Spread { area, images_per_unit } = spreads(&[material.clone()], &geometry)[0];
+            let found = images_per_unit / area;
+            assert!(found.abs_diff_eq(Vec2::new(0.25, 1.0 / 6.0), 1e-6), "{found}");
+        }
+    }
+}
