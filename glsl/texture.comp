@@ -82,7 +82,8 @@ void read_textures(uint path) {
             }
             vec2 direction = along_surface(axis, tangent, front, shading_normal);
             if (material.kind == MATERIAL_MEASURED) {
-                width.anisotropy = direction;
+                // Turns of a table are those of its front: an axis of length 2 tells of the back.
+                width.anisotropy = side < 0.0 ? 2.0 * direction : direction;
             } else {
                 width = stretched_width(width.alpha, length(axis), direction);
             }

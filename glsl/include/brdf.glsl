@@ -428,12 +428,15 @@ void brdf_evaluate_and_pdf(
         return;
     }
     if (is_kind(material, MATERIAL_MEASURED)) {
-        vec3 angles = half_difference_angles(outgoing_local, incident_local);
+        // Mirror a table that is seen from behind, which an axis of length 2 tells. The twins see fronts.
+        bool is_back = IS_ANISOTROPIC && dot(material.anisotropy, material.anisotropy) > 2.0;
+        vec3 image = vec3(1.0, is_back ? -1.0 : 1.0, 1.0);
+        vec3 angles = half_difference_angles(image * outgoing_local, image * incident_local);
         value = measured_value(material.table_offset, angles);
         if (IS_ANISOTROPIC && material.anisotropy != vec2(0.0)) {
             value *= measured_turn(
-                material.table_offset, angles, outgoing_local + incident_local,
-                material.anisotropy);
+                material.table_offset, angles, image * (outgoing_local + incident_local),
+                image.xy * material.anisotropy);
         }
         pdf = measured_pdf(reflector, incident_local, angles.x);
         return;

@@ -97,13 +97,14 @@ fn measured(diffuse: Vec3, alpha: f32) -> MaterialKind {
     }
 }
 
-/// Returns a brushed metal, stretched along its tangent, and the same from a table of all turns.
+/// Returns a brushed metal, stretched at half a radian from its tangent, and the same from a table of all
+/// turns.
 pub fn brushed_and_measured() -> [Material; 2] {
     static BOTH: OnceLock<[Material; 2]> = OnceLock::new();
     let both = BOTH.get_or_init(|| {
         let fresnel = ConductorFresnel::Schlick { reflectance: vec3(0.9, 0.7, 0.5) };
         let metal = case("metal", 0.2, MaterialKind::Conductor { alpha: 0.2, fresnel });
-        let metal = brushed(metal, 0.6, 0.0).material;
+        let metal = brushed(metal, 0.6, 0.5).material;
         let model = MaterialTables::new(std::slice::from_ref(&metal)).unwrap();
         let value = |outgoing, incident| brdf::evaluate(&model, 0, outgoing, incident);
         let table = Arc::new(MeasuredTable::tabulate_turns(value).unwrap());
