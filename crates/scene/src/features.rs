@@ -27,7 +27,7 @@ features! {
     /// Parts of glTF 2.0.
     GLTF;
     GLTF_CAMERAS "cameras that are not used" "";
-    GLTF_ORTHOGRAPHIC "orthographic cameras" "refused if `--camera` names one";
+    GLTF_ORTHOGRAPHIC "orthographic cameras" "perspective from afar";
     GLTF_NO_IMAGE "textures without an image" "";
     GLTF_HIGH_UV "textures with coordinates of the third or a further set" "";
     GLTF_COLORS "further sets of vertex colours" "";
@@ -179,6 +179,7 @@ features! {
     MI_SPOT_TEXTURE "`texture` of a `spot`" "its mean over the whole cone";
     MI_EMITTER "other emitters, by name" "left out";
     MI_SENSORS "sensors that are not used" "";
+    MI_SENSOR "other sensors, by name" "`orthographic` from afar, else a view is found";
     MI_FILTER "other `rfilter`s" "`gaussian` of ½";
     MI_INTEGRATOR "integrators of other pictures than those of paths, by name" "";
     MI_HIDE_EMITTERS "`hide_emitters`" "lights are seen";

@@ -36,7 +36,8 @@ fn text_that_mitsuba_takes_is_taken() {
          <boolean name=\"flip_normals\" value=\"TRUE\"/></shape>\
          <shape type=\"sphere\"><float name=\"radius\" value=\"2f\"/>\n<fog/></shape>",
     );
-    let text = format!("\n<?xml version=\"1.0\" encoding=\"latin1\"?>\n{text}");
+    let kind = "<!DOCTYPE scene SYSTEM \"scene.dtd\">";
+    let text = format!("\n<?xml version=\"1.0\" encoding=\"latin1\"?>{kind}\n{text}");
     let latin_1: Vec<u8> = text.chars().map(|c| c as u32 as u8).collect();
     let scene = Scene::load(&folder.write("a.xml", latin_1)).unwrap();
     assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
@@ -74,6 +75,32 @@ fn elements_are_read_where_papers_have_them() {
     assert!(unknown.contains("integrator `guided` (line 2)"), "{unknown}");
     assert!(absent.contains("`absent.hdr`, which is not there (line 5)"), "{absent}");
     assert!(unused.contains("sensors that are not used (line 4)"), "{unused}");
+}
+
+/// All of the film is seen at the depth of the sensor, from so far that depth counts little.
+#[test]
+fn orthographic_sensors_see_from_afar_and_others_find_a_view() {
+    let sensor = |kind: &str| {
+        let text = format!(
+            "<scene version=\"3.0.0\"><sensor type=\"{kind}\"><transform name=\"to_world\">\
+             <scale value=\"3\"/><lookat origin=\"0,0,5\" target=\"0,0,0\" up=\"0,1,0\"/></transform>\
+             <film type=\"hdrfilm\"><integer name=\"width\" value=\"40\"/><integer name=\"height\" \
+             value=\"20\"/></film></sensor><emitter type=\"constant\"/><shape type=\"cube\"/></scene>"
+        );
+        let folder = Folder::new();
+        Scene::load(&folder.write("a.xml", text)).unwrap()
+    };
+    let flat = sensor("orthographic");
+    let far = flat.camera.position.z - 5.0;
+    let half = (0.5 * flat.camera.vertical_fov_deg).to_radians().tan() * far;
+    assert!(far > 100.0 && (half - 1.5).abs() < 1e-3, "{far} {half}");
+    let [warning] = &flat.warnings[..] else { panic!("{:?}", flat.warnings) };
+    assert!(warning.contains("ignored sensor `orthographic` (line 1)"), "{warning}");
+    let other = sensor("radiancemeter");
+    assert_eq!((other.film.width, other.film.height), (40, 20));
+    let [sensor, view] = &other.warnings[..] else { panic!("{:?}", other.warnings) };
+    assert!(sensor.contains("ignored sensor `radiancemeter`"), "{sensor}");
+    assert!(view.contains("one that frames the bounding box"), "{view}");
 }
 
 /// Mitsuba 3.9.1 takes 0 for an `eta` and 1 for a `k` that a file leaves out.

@@ -28,7 +28,7 @@ use glam::Vec3;
 
 use crate::support::{
     assert_contains,
-    folder::Folder,
+    folder::{self, Folder},
     gltf::{Attribute, base64, floats, gltf, gltf_of, png},
     seeds::glb,
 };
@@ -1591,6 +1591,46 @@ fn the_first_gltf_camera_with_perspective_gives_view_and_film() {
     assert_eq!((scene.film.width, scene.film.height), (640, 320));
     let left_out = ["orthographic cameras (`flat`)", "cameras that are not used (`far`)"];
     assert_contains(&scene.warnings.concat(), &left_out);
+}
+
+/// All of its height is seen at the depth of the camera, from so far that depth counts little.
+#[test]
+fn orthographic_cameras_of_gltf_see_from_afar() {
+    let nodes = r#"{"mesh": 0, "children": [1]},
+        {"camera": 0, "translation": [0, 1, 5], "scale": [2, 2, 2]}"#;
+    let rest = r#", "cameras": [{"type": "orthographic", "name": "flat",
+        "orthographic": {"xmag": 6, "ymag": 3, "zfar": 9, "znear": 0.1}}]"#;
+    let folder = Folder::new();
+    let path = folder.write("a.gltf", gltf(nodes, "", "", rest));
+    for name in [None, Some("flat".to_owned())] {
+        let options = LoadOptions { camera: name, ..LoadOptions::default() };
+        let scene = Scene::load_with(&path, &options).unwrap();
+        let place = scene.camera.position - Vec3::new(0.0, 1.0, 5.0);
+        let half = (0.5 * scene.camera.vertical_fov_deg).to_radians().tan() * place.z;
+        assert!(place.truncate().length() < 1e-3 && place.z > 1000.0, "{place}");
+        assert!((half - 6.0).abs() < 1e-3, "{half}");
+        assert_eq!((scene.film.width, scene.film.height), (640, 320));
+        assert_contains(&scene.warnings.concat(), &["orthographic cameras (`flat`)"]);
+    }
+}
+
+/// Nothing is seen of a surface without opacity, not even its light.
+#[test]
+fn a_light_that_is_not_seen_is_named() {
+    let folder = Folder::new();
+    let clay = |opacity: &str| {
+        let clay = "type = \"diffuse\"\nreflectance = [1, 1, 1]\nemission = [2, 2, 2]";
+        folder::yard(
+            [8, 8],
+            "constant = [1, 1, 1]",
+            &format!("{clay}\n{opacity}"),
+            "shape = \"sphere\"\nradius = 1.0",
+        )
+    };
+    let scene = |opacity| Scene::load(&folder.write("a.toml", clay(opacity))).unwrap();
+    let expected = "a.toml: the light of `clay` is not seen: its opacity is 0";
+    assert_contains(&scene("opacity = 0.0").warnings.concat(), &[expected]);
+    assert_eq!(scene("opacity = 0.1").warnings, [""; 0]);
 }
 
 #[test]

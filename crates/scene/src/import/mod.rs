@@ -40,6 +40,9 @@ pub(crate) struct Imported {
     pub warnings: Vec<String>,
 }
 
+/// Heights of its picture from which an orthographic camera is seen, where rays are all but parallel.
+pub(crate) const FAR: f64 = 100.0;
+
 /// Refractive indices of solids.
 pub(crate) const SOLID_IOR: (f32, f32) = (0.1, 10.0);
 

@@ -248,6 +248,14 @@ impl<'a> Loader<'a> {
                 ));
             }
         }
+        let is_unseen = |material: &&Material| {
+            material.surface.emission.is_some() && material.surface.opacity.factor == 0.0
+        };
+        if let Some(Material { name, .. }) = scene.materials.iter().find(is_unseen) {
+            let file = self.path.display();
+            let message = format!("{file}: the light of `{name}` is not seen: its opacity is 0");
+            scene.warnings.push(message);
+        }
         let largest = scene.materials.iter().map(|own| (own.largest_color(), &own.name));
         let cut: Vec<_> = largest.filter(|(largest, _)| *largest > CUT).collect();
         if let Some((largest, name)) = cut.iter().max_by(|(a, _), (b, _)| a.total_cmp(b)) {

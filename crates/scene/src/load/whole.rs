@@ -19,7 +19,7 @@ use crate::{
     import::Imported,
     instance::{Budget, Instance, MAX_INSTANCES, bounds},
     material::{Material, MaterialKind, Principled},
-    mesh::{Mesh, MeshCamera, MeshMaterial, Perspective, RepeatedMesh},
+    mesh::{Mesh, MeshCamera, MeshMaterial, RepeatedMesh},
     transform::Transform,
 };
 
@@ -43,7 +43,7 @@ impl Loader<'_> {
         let chosen = self.choose_camera(&mesh.cameras, &mut ignored)?;
         let (materials, geometry) = self.place_whole(&mesh, &mut ignored, &mut warnings)?;
         warnings.extend(ignored.warnings(self.path));
-        let aspect_ratio = chosen.and_then(|(_, lens)| lens.aspect_ratio);
+        let aspect_ratio = chosen.and_then(|camera| camera.perspective.aspect_ratio);
         let aspect_ratio = aspect_ratio.filter(|ratio| *ratio > 0.0).unwrap_or(ASPECT_RATIO);
         let height = (FILM_WIDTH as f32 / aspect_ratio).round();
         let film = FilmSettings {
@@ -55,7 +55,7 @@ impl Loader<'_> {
         let (environment, lamps) = (None, mesh.lamps);
         let asked = Asked::default();
         Ok(Imported {
-            camera: chosen.map(|(camera, lens)| camera_entry(camera, lens)),
+            camera: chosen.map(camera_entry),
             film,
             asked,
             environment,
@@ -68,14 +68,15 @@ impl Loader<'_> {
         })
     }
 
-    /// Finds the camera that the options name, else the first with perspective; the others are ignored.
+    /// Finds the camera that the options name, else the first, rather one with perspective; the others are
+    /// ignored.
     fn choose_camera<'a>(
         &self,
         cameras: &'a [MeshCamera],
         ignored: &mut Ignored,
-    ) -> Result<Option<(&'a MeshCamera, Perspective)>> {
+    ) -> Result<Option<&'a MeshCamera>> {
         let chosen = match &self.options.camera {
-            None => cameras.iter().position(|camera| camera.perspective.is_some()),
+            None => (0..cameras.len()).min_by_key(|index| cameras[*index].is_orthographic),
             Some(name) => {
                 let has_name = |camera: &MeshCamera| camera.names.iter().any(|own| own == name);
                 let by_number = || name.parse().ok().filter(|&index: &usize| index < cameras.len());
@@ -88,19 +89,18 @@ impl Loader<'_> {
                         "--camera {name}: there is no such camera, the file has {known}"
                     )));
                 };
-                self.check(cameras[index].perspective.is_some(), || {
-                    format!("--camera {name}: an orthographic camera, which cannot be used")
-                })?;
                 Some(index)
             }
         };
-        for (index, camera) in cameras.iter().enumerate().filter(|(i, _)| Some(*i) != chosen) {
-            let is_perspective = camera.perspective.is_some();
-            let feature =
-                if is_perspective { features::GLTF_CAMERAS } else { features::GLTF_ORTHOGRAPHIC };
+        for (index, camera) in cameras.iter().enumerate() {
+            let feature = match camera.is_orthographic {
+                true => features::GLTF_ORTHOGRAPHIC,
+                false if Some(index) != chosen => features::GLTF_CAMERAS,
+                false => continue,
+            };
             ignored.add(feature, || camera.label(index));
         }
-        Ok(chosen.and_then(|index| Some((&cameras[index], cameras[index].perspective?))))
+        Ok(chosen.map(|index| &cameras[index]))
     }
 
     /// Takes the mesh as it stands, with one material more for triangles without.
@@ -253,14 +253,15 @@ fn pinhole(position: Vec3, look_at: Vec3, up: Vec3, vertical_fov_deg: f32) -> Ca
 }
 
 /// Entry of a camera of the file, for the checks that all cameras pass.
-fn camera_entry(camera: &MeshCamera, lens: Perspective) -> CameraEntry {
+fn camera_entry(camera: &MeshCamera) -> CameraEntry {
     let matrix = camera.world_from_camera;
     let position = matrix.w_axis.truncate();
     // Look at a point so far away that single precision keeps the direction.
     let distance = position.length().max(1.0);
     let forward = matrix.transform_vector3(Vec3::NEG_Z).normalize_or_zero();
     let up = matrix.transform_vector3(Vec3::Y).normalize_or_zero();
-    pinhole(position, position + distance * forward, up, lens.vertical_fov_rad.to_degrees())
+    let fov_deg = camera.perspective.vertical_fov_rad.to_degrees();
+    pinhole(position, position + distance * forward, up, fov_deg)
 }
 
 /// Checks that a mesh file is one that [`Loader::whole`] reads.

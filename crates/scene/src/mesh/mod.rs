@@ -114,8 +114,10 @@ pub struct MeshCamera {
     pub names: Vec<String>,
     /// The camera looks along −Z, with +Y up.
     pub world_from_camera: Mat4,
-    /// None for an orthographic camera.
-    pub perspective: Option<Perspective>,
+    /// Lens; that of a camera from afar for an orthographic one.
+    pub perspective: Perspective,
+    /// True for a camera that is orthographic in the file.
+    pub is_orthographic: bool,
 }
 
 impl MeshCamera {

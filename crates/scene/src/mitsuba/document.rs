@@ -388,14 +388,15 @@ impl Builder {
 }
 
 /// Text as a strict reader takes it, with its lines where they are: Mitsuba's reader takes comments of
-/// dashes, `&` in names, and space above the declaration, which files written by hand have.
+/// dashes, `&` in names, document types, and space above the declaration, which files written by hand have.
 fn strict(text: &str) -> String {
     let mut strict = String::with_capacity(text.len());
     let mut rest = text;
     while let Some(at) = rest.find(['<', '&']) {
         strict.push_str(&rest[..at]);
         rest = &rest[at..];
-        let skipped = [("<!--", "-->"), ("<?", "?>")].into_iter().find_map(|(start, end)| {
+        let ends = [("<!--", "-->"), ("<?", "?>"), ("<!DOCTYPE", ">")];
+        let skipped = ends.into_iter().find_map(|(start, end)| {
             let inside = rest.strip_prefix(start)?;
             Some(inside.find(end).map_or(rest.len(), |at| start.len() + at + end.len()))
         });

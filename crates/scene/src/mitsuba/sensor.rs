@@ -9,6 +9,7 @@ use super::{
 };
 use crate::{
     Asked, FilmSettings, Filter, MAX_FILM_SIDE, error::Result, features, file::CameraEntry,
+    import::FAR,
 };
 
 /// Diagonal of a film of 36 × 24 mm, millimetres.
@@ -34,9 +35,14 @@ impl Reader {
         sensors: &[Node<'_>],
         name: Option<&str>,
     ) -> Result<(Option<CameraEntry>, FilmSettings)> {
-        let is_rendered = |sensor: &Node<'_>| matches!(sensor.kind(), "perspective" | "thinlens");
+        let worth = |sensor: Node<'_>| match sensor.kind() {
+            "perspective" | "thinlens" => 2,
+            kind => usize::from(kind == "orthographic"),
+        };
         let chosen = match name {
-            None => sensors.iter().position(is_rendered).unwrap_or(0),
+            None => {
+                (0..sensors.len()).rev().max_by_key(|index| worth(sensors[*index])).unwrap_or(0)
+            }
             Some(name) => {
                 let has_id = |sensor: &Node<'_>| sensor.attribute("id") == Some(name);
                 let by_number = || name.parse().ok().filter(|&index: &usize| index < sensors.len());
@@ -59,13 +65,14 @@ impl Reader {
             self.ignored.add(features::MI_SENSORS, || other.place());
         }
         let parameters = Parameters::new(sensor);
-        if !is_rendered(&sensor) {
-            let found = sensor.kind();
-            return Err(sensor.error(format!(
-                "the sensor `{found}` is not rendered; expected perspective or thinlens"
-            )));
-        }
         let film = self.film(&parameters)?;
+        if worth(sensor) < 2 {
+            let name = format!("sensor `{}`", sensor.kind());
+            self.ignored.add_named(features::MI_SENSOR, &name, || sensor.place());
+        }
+        if worth(sensor) == 0 {
+            return Ok((None, film.settings));
+        }
         let camera = self.camera(&parameters, &film)?;
         for sampler in parameters.objects("sampler")? {
             self.sampler(sampler)?;
@@ -108,15 +115,22 @@ impl Reader {
                 parameters.integer("max_depth")?
             }
         };
-        if edges.is_some_and(|edges| edges < 2 && edges != -1) {
-            let name = "`max_depth` below 2, for which direct light is rendered";
-            self.ignored.add_named(features::MI_INTEGRATOR, name, || node.place());
-        }
         // Mitsuba counts the edges of a path, the one to the light included.
+        let most = i64::from(Asked::MAX_DEPTH) + 1;
+        let cut = match edges {
+            Some(..2) if edges != Some(-1) => {
+                Some("`max_depth` below 2, for which direct light is rendered".to_owned())
+            }
+            Some(edges) if edges > most => Some(format!("`max_depth` above {most}")),
+            _ => None,
+        };
+        if let Some(name) = cut {
+            self.ignored.add_named(features::MI_INTEGRATOR, &name, || node.place());
+        }
         self.asked.depth = match edges {
             None => self.asked.depth,
             Some(-1) => Some(Asked::MAX_DEPTH),
-            Some(edges) => Some((edges - 1).clamp(1, i64::from(Asked::MAX_DEPTH)) as u32),
+            Some(edges) => Some(edges.clamp(2, most) as u32 - 1),
         };
         let roulette = parameters.integer("rr_depth")?;
         let roulette = roulette.and_then(|depth| u32::try_from(depth).ok());
@@ -137,7 +151,11 @@ impl Reader {
         // The y axis of films points down.
         let height = f64::from(film.settings.height);
         let shift = (film.middle + offset * film.whole) / height * DVec2::new(1.0, -1.0);
-        let tangent = half_height_tangent(parameters, film.whole.x / film.whole.y)?;
+        let aspect = film.whole.x / film.whole.y;
+        let (tangent, back) = match node.kind() {
+            "orthographic" => (0.5 / FAR, 2.0 * FAR * matrix.y_axis.length() / aspect),
+            _ => (half_height_tangent(parameters, aspect)?, 0.0),
+        };
         let tangent = tangent * height / film.whole.y;
         let vertical_fov_deg = 2.0 * tangent.atan().to_degrees();
         if !(FOV_RANGE_DEG.0..=FOV_RANGE_DEG.1).contains(&vertical_fov_deg) {
@@ -157,7 +175,7 @@ impl Reader {
             // A pinhole has no use for it; files that were made for both kinds have it.
             parameters.without_effect("focus_distance aperture_radius");
         }
-        let position = matrix.w_axis.truncate();
+        let position = matrix.w_axis.truncate() - back * forward;
         // Look at a point so far away that single precision keeps the direction.
         let look_at = position + forward * position.length().max(1.0);
         Ok(CameraEntry {

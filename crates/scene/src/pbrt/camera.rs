@@ -7,7 +7,8 @@ use super::{
     parameters::{Entity, Kind, Log},
 };
 use crate::{
-    FilmSettings, Filter, error::Result, features, file::CameraEntry, spectrum::white_balance,
+    FilmSettings, Filter, error::Result, features, file::CameraEntry, import::FAR,
+    spectrum::white_balance,
 };
 
 /// Viewer and image plane.
@@ -116,8 +117,6 @@ fn window(entity: &Entity, crop: &Crop, log: &mut Log) -> Result<(f64, [f64; 2],
     let [low, high] = crop.bounds;
     let share = (high.y - low.y) / crop.whole.y;
     let middle = (0.5 * (low + high) - 0.5 * crop.whole) / crop.whole.y;
-    // From so many heights away, rays that meet in the camera are all but parallel.
-    const FAR: f64 = 100.0;
     let (half, back) = match entity.name.as_str() {
         "orthographic" => (1.0 / (FAR * height), FAR * height),
         _ => ((0.5 * fov).to_radians().tan(), 0.0),

@@ -12,6 +12,7 @@ use super::{GltfReader, index};
 use crate::{
     error::Result,
     features::{self, Ignored},
+    import::FAR,
     mesh::{MeshCamera, Perspective, label},
 };
 
@@ -99,15 +100,22 @@ impl GltfReader<'_> {
     pub(super) fn read_node(&mut self, node: &Node, world_from_node: Mat4) {
         if let Some(camera) = node.camera() {
             let names = [camera.name(), node.name()].into_iter().flatten().map(str::to_owned);
-            let perspective = match camera.projection() {
-                Projection::Perspective(lens) => Some(Perspective {
-                    vertical_fov_rad: lens.yfov(),
-                    aspect_ratio: lens.aspect_ratio(),
-                }),
-                Projection::Orthographic(_) => None,
+            let far = FAR as f32;
+            let (fov, aspect_ratio, back) = match camera.projection() {
+                Projection::Perspective(lens) => (lens.yfov(), lens.aspect_ratio(), None),
+                Projection::Orthographic(lens) => {
+                    let height = 2.0 * lens.ymag().abs();
+                    let ratio = lens.xmag() / lens.ymag();
+                    (2.0 * (0.5 / far).atan(), Some(ratio), Some(far * height))
+                }
             };
-            let names = names.collect();
-            let found = MeshCamera { names, world_from_camera: world_from_node, perspective };
+            let moved_back = Mat4::from_translation(Vec3::Z * back.unwrap_or(0.0));
+            let found = MeshCamera {
+                names: names.collect(),
+                world_from_camera: world_from_node * moved_back,
+                perspective: Perspective { vertical_fov_rad: fov, aspect_ratio },
+                is_orthographic: back.is_some(),
+            };
             self.cameras.push((camera.index(), found));
         }
         let place = || label("node", node.index(), node.name());
