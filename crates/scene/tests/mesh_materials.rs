@@ -1018,6 +1018,15 @@ fn obj_files_of_others_are_read() {
     ] {
         assert!(warnings.iter().any(|text| text.contains(expected)), "{expected}: {warnings:?}");
     }
+    // Faces may stand above what they name, and old files have their own word for them.
+    let late = "f 1/1/1 2/2/1 3/3/1\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nfo -3 -1 -2\n\
+        vt 0 1\nvn 0 0 1\n";
+    let mut warnings = Vec::new();
+    let mesh = Mesh::read(&folder.write("a.obj", late), &mut warnings).unwrap();
+    assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
+    assert_eq!(mesh.positions[4..], [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]);
+    assert_eq!((mesh.uvs[0][2], mesh.normals[2]), ([0.0, 1.0], [0.0, 0.0, 1.0]));
+    assert_eq!(warnings, [""; 0]);
     let wide: Vec<u8> = "v 0 0 0\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
     let path = folder.write("a.obj", [&b"\xff\xfe"[..], &wide].concat());
     assert!(Scene::load(&path).unwrap_err().to_string().contains("found UTF-16: save it as UTF-8"));
@@ -1093,7 +1102,24 @@ fn mtl_materials_become_surfaces() {
     let reflectance = Vec3::new(0.9, 0.8, 0.7);
     let mirror = kind("Kd 0 0 0\nKs 0.9 0.8 0.7\nillum 3");
     assert!(matches!(mirror, MaterialKind::Mirror { reflectance: found } if found == reflectance));
-    for keys in ["Ks 0.5\nillum 3", "Ks 0.5\nillum 7\nd 0.8", "Ks 0.5", "Kd 0\nKs 0.5\nillum 2"] {
+    // The Cornell boxes of the McGuire archive have mirrors and solid glass of a dark colour.
+    let mirror = kind("Kd 0.01 0.01 0.01\nKs 0.95 0.95 0.95\nNs 1000\nillum 5");
+    assert!(matches!(mirror, MaterialKind::Mirror { reflectance } if reflectance.x == 0.95));
+    let (glass, warnings) = mtl_material(&folder, "Kd 0.01\nKs 0.3\nTf 0.25\nNi 1.33\nillum 7");
+    let MaterialKind::Dielectric { ior, transmittance, .. } = glass.kind else {
+        panic!("{glass:?}")
+    };
+    assert_eq!((ior, transmittance), (1.33, Vec3::splat(0.5)));
+    assert_eq!(warnings, [""; 0]);
+    for keys in [
+        "Ks 0.5\nillum 3",
+        "Ks 0.5\nillum 7\nd 0.8",
+        "Ks 0.5",
+        "Kd 0\nKs 0.5\nillum 2",
+        "Kd 0\nKs 1\nillum 7",
+        "Kd 0.1\nKs 1\nNi 1.5\nillum 7",
+        "Kd 0\nKs 1\nNi 1.5\nillum 7\nd 0.8",
+    ] {
         assert!(matches!(kind(keys), MaterialKind::Plastic { .. }), "{keys}");
     }
     let debug = |keys: &str| format!("{:?}", kind(keys));

@@ -31,6 +31,10 @@ use crate::{
 /// Ends a chain of vertices; also the normal or texture coordinates of a corner that has none.
 const NONE: u32 = u32::MAX;
 
+/// Keywords of what faces number, and their names.
+const VERTICES: [(&str, &str); 3] =
+    [("v", "position"), ("vt", "texture coordinate"), ("vn", "normal")];
+
 /// Most vertices of a chain; further vertices of its position are found by hash.
 const LONGEST_CHAIN: usize = 16;
 
@@ -46,10 +50,23 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     // The arrays of a mesh take about as much as its text.
     memory::check(path.display(), bytes).map_err(Error::memory)?;
     let mut reader = ObjReader { path: path.to_path_buf(), ..ObjReader::default() };
-    for_each_line(path, file, |line, text| {
-        reader.line = line;
-        reader.read_line(text, warnings)
-    })?;
+    let warnings_before = warnings.len();
+    reader.read_lines(file, warnings)?;
+    if reader.looks_ahead {
+        // Faces may stand above their vertices, which are known the second time.
+        warnings.truncate(warnings_before);
+        reader = ObjReader {
+            path: reader.path,
+            knows_vertices: true,
+            chains: vec![NONE; reader.positions.len()],
+            positions: reader.positions,
+            colors: reader.colors,
+            uvs: reader.uvs,
+            normals: reader.normals,
+            ..ObjReader::default()
+        };
+        reader.read_lines(files::open_unpacked(path)?.0, warnings)?;
+    }
     let (mut mesh, ignored) = reader.finish(warnings);
     warnings.extend(ignored.warnings(path));
     mesh.part_coincident(path, warnings);
@@ -108,6 +125,12 @@ struct Vertex {
 struct ObjReader {
     path: PathBuf,
     line: usize,
+    /// True once a face names what stands below it, or nowhere; it is left out.
+    looks_ahead: bool,
+    /// True if positions, texture coordinates and normals are those of the whole file.
+    knows_vertices: bool,
+    /// Numbers of these so far.
+    counts: [usize; 3],
     positions: Vec<[f32; 3]>,
     /// Colours of positions as they stand.
     colors: Vec<[f32; 3]>,
@@ -136,8 +159,21 @@ impl ObjReader {
         Error::parse(&self.path, self.line, 1, message)
     }
 
+    fn read_lines(&mut self, file: impl BufRead, warnings: &mut Vec<String>) -> Result<()> {
+        for_each_line(&self.path.clone(), file, |line, text| {
+            self.line = line;
+            self.read_line(text, warnings)
+        })
+    }
+
     fn read_line(&mut self, text: &str, warnings: &mut Vec<String>) -> Result<()> {
         let (keyword, rest) = statement(text);
+        if let Some(kind) = VERTICES.iter().position(|(own, _)| *own == keyword) {
+            self.counts[kind] += 1;
+            if self.knows_vertices {
+                return Ok(());
+            }
+        }
         match keyword {
             "v" => {
                 let position = self.vector(rest, 3)?;
@@ -157,7 +193,7 @@ impl ObjReader {
                 let [u, v] = self.vector(rest, 1)?;
                 self.uvs.push([u, v]);
             }
-            "f" => self.read_face(rest)?,
+            "f" | "fo" => self.read_face(rest)?,
             "usemtl" => {
                 let next = self.material_names.len();
                 let material = *self.material_indices.entry(rest.to_owned()).or_insert(next);
@@ -200,7 +236,12 @@ impl ObjReader {
 
     fn read_face(&mut self, words: &str) -> Result<()> {
         let words = words.split_ascii_whitespace();
-        let corners: Vec<u32> = words.map(|word| self.corner(word)).collect::<Result<_>>()?;
+        let corners = words.map(|word| self.corner(word)).collect::<Result<Vec<u32>>>();
+        if corners.is_err() && !self.knows_vertices {
+            self.looks_ahead = true;
+            return Ok(());
+        }
+        let corners = corners?;
         match corners[..] {
             [] | [_] | [_, _] => self.ignore(features::OBJ_FACE, features::OBJ_FACE.name),
             [a, b, c] => self.mesh.triangles.push([a, b, c]),
@@ -213,10 +254,9 @@ impl ObjReader {
     fn corner(&mut self, word: &str) -> Result<u32> {
         let mut parts = word.split('/');
         let position = parts.next().unwrap_or_default();
-        let position = self.index(position, self.positions.len(), "position")?;
-        let (uv, normal) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
-        let uv = self.attribute(uv, self.uvs.len(), "texture coordinate");
-        let normal = self.attribute(normal, self.normals.len(), "normal");
+        let position = self.index(position, 0)?;
+        let uv = self.attribute(parts.next().unwrap_or_default(), 1);
+        let normal = self.attribute(parts.next().unwrap_or_default(), 2);
         let mut vertex = self.chains[position as usize];
         let mut chain_length = 0;
         while vertex != NONE {
@@ -250,23 +290,29 @@ impl ObjReader {
         Ok(vertex)
     }
 
-    /// Index of an attribute that a corner may have; none for one that the file does not have so far.
-    fn attribute(&mut self, word: &str, count: usize, what: &str) -> u32 {
+    /// Index of an attribute that a corner may have; none for one that the file does not have.
+    fn attribute(&mut self, word: &str, kind: usize) -> u32 {
         if word.is_empty() {
             return NONE;
         }
-        self.index(word, count, what).unwrap_or_else(|_| {
+        self.index(word, kind).unwrap_or_else(|_| {
+            let what = VERTICES[kind].1;
             self.ignore(features::OBJ_INDEX, &format!("indices of {what}s that are not there"));
+            self.looks_ahead = true;
             NONE
         })
     }
 
-    /// Converts to an index from 0; the file counts from 1, or backwards from −1, the latest.
-    fn index(&self, word: &str, count: usize, what: &str) -> Result<u32> {
+    /// Converts to an index from 0 of one of [`VERTICES`]; the file counts from 1, or backwards from −1, the
+    /// latest.
+    fn index(&self, word: &str, kind: usize) -> Result<u32> {
+        let what = VERTICES[kind].1;
         let stated: i64 = word
             .parse()
             .map_err(|_| self.error(format!("expected the index of a {what}, found `{word}`")))?;
-        let index = if stated < 0 { stated + count as i64 } else { stated - 1 };
+        let count = [self.positions.len(), self.uvs.len(), self.normals.len()][kind];
+        let before = self.counts[kind] as i64;
+        let index = if stated < 0 { stated + before } else { stated - 1 };
         if (0..count as i64).contains(&index)
             && let Ok(index) = u32::try_from(index)
             && index != NONE

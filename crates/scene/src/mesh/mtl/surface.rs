@@ -23,6 +23,8 @@ const DEFAULT_ROUGHNESS: f32 = 0.5;
 const PANE_OPACITY: f32 = 0.5;
 /// Largest component of a black colour.
 const BLACK: f32 = 1e-3;
+/// Largest component of a colour below a mirror or glass, which hand-written files leave above black.
+const DARK: f32 = 0.02;
 /// Smallest GGX width of a gloss that is not a mirror.
 const SMALLEST_WIDTH: f32 = 1e-3;
 
@@ -92,6 +94,9 @@ impl LibraryMaterial {
         let ior = self.ior.filter(is_of_coat).unwrap_or(DEFAULT_IOR);
         let is_glossy = self.specular.max_element() > 0.0 && self.model >= 2;
         let is_pane = matches!(self.model, 4 | 6 | 7 | 9) && opacity < PANE_OPACITY;
+        // Converters write these models for all surfaces; those that refract have an index.
+        let is_solid = matches!(self.model, 6 | 7) && self.ior.is_some() && opacity == 1.0;
+        let is_dark = color_map.is_none() && diffuse.max_element() <= DARK;
         let kind = if self.is_metallic_roughness() {
             let one_if = |texture: bool, otherwise| if texture { 1.0 } else { otherwise };
             let roughness = one_if(surface.roughness.is_some(), DEFAULT_ROUGHNESS);
@@ -122,7 +127,12 @@ impl LibraryMaterial {
             let tint = if surface.color.is_some() { Vec3::ONE } else { tint };
             let transmittance = self.filter.unwrap_or(tint);
             MaterialKind::pane(ior, transmittance)
-        } else if is_glossy && matches!(self.model, 3 | 5) && diffuse.max_element() <= BLACK {
+        } else if is_dark && is_solid {
+            // The filter is that of two surfaces.
+            let transmittance = self.filter.unwrap_or(Vec3::ONE).powf(0.5);
+            let (reflectance, absorption) = (Vec3::ONE, Vec3::ZERO);
+            MaterialKind::Dielectric { ior, alpha: 0.0, reflectance, transmittance, absorption }
+        } else if is_dark && is_glossy && matches!(self.model, 3 | 5) {
             MaterialKind::Mirror { reflectance: self.specular }
         } else if is_glossy {
             ignore(features::MTL_KS_COLOR);
@@ -132,7 +142,8 @@ impl LibraryMaterial {
         } else {
             MaterialKind::Diffuse { reflectance: diffuse }
         };
-        if !is_pane && self.filter.is_some_and(|filter| filter != Vec3::ONE) {
+        let is_glass = is_pane || matches!(kind, MaterialKind::Dielectric { .. });
+        if !is_glass && self.filter.is_some_and(|filter| filter != Vec3::ONE) {
             ignore(features::MTL_TF);
         }
         surface.opacity = Opacity {
