@@ -899,6 +899,15 @@ fn what_the_format_leaves_open_is_completed() {
     let hidden = load(&hidden.replace(one, r#""scenes": [{"nodes": [0, 1]}]"#));
     assert!(triangle(&hidden));
     assert!(hidden.warnings.iter().all(|text| !text.contains("ignored")), "{:?}", hidden.warnings);
+    // A part without positions, and numbers that exporters write and nobody reads.
+    let two = whole.replace(r#""primitives": ["#, r#""primitives": [{"attributes": {}}, "#);
+    let odd =
+        two.replace(r#""bufferViews": [{"#, r#""bufferViews": [{"target": 7, "byteStride": 0, "#);
+    let odd = load(
+        &odd.replace(one, &format!(r#""samplers": [{{"wrapS": 0, "magFilter": 9987}}], {one}"#)),
+    );
+    assert!(two != whole && triangle(&odd));
+    assert!(odd.warnings.iter().any(|text| text.contains("points and lines (mesh `sail`)")));
     let idle = r#"{"extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 0},
         "KHR_materials_iridescence": {"iridescenceFactor": 0}, "KHR_materials_dispersion": {}}}"#;
     let (_, warnings) = gltf_material(&folder, idle, "");
@@ -1362,6 +1371,18 @@ fn ply_coordinates_and_colours_are_read() {
     let [header, number] = &warnings[..] else { panic!("{warnings:?}") };
     assert!(header.contains("other lines of the header (`Made by Blender`)"), "{header}");
     assert!(number.contains("ignored `texnumber` of faces"), "{number}");
+    // Old Macs end lines otherwise, and programs count in integers of 64 bits.
+    let quad = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n\
+        property float y\nproperty float z\nelement face 1\n\
+        property list uchar int64 vertex_indices\nend_header\n";
+    let floats = [10.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
+    let indices = [0_i64, 2, 1].map(i64::to_le_bytes);
+    let body = [floats.as_flattened(), &[3], indices.as_flattened()].concat();
+    for header in [quad.to_owned(), quad.replace('\n', "\r"), quad.replace('\n', "\r\n")] {
+        let path = folder.write("e.ply", [header.as_bytes(), &body].concat());
+        let mesh = Mesh::read(&path, &mut Vec::new()).unwrap();
+        assert_eq!((&mesh.triangles[..], mesh.positions[0]), (&[[0, 2, 1]][..], [10.0, 0.0, 0.0]));
+    }
     let strips = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
         property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n\
         0 0 0\n1 0 0\n0 1 0\n1 1 0\n8 0 1 2 3 -1 3 2 1\n";

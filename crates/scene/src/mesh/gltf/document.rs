@@ -9,8 +9,8 @@ use base64::{
 use gltf::{
     Document, Glb,
     buffer::Source,
-    json::{Index, Root, validation::Checked},
-    mesh::Semantic,
+    json::{Index, Root, texture::Sampler, validation::Checked},
+    mesh::{Mode, Semantic},
 };
 use percent_encoding::percent_decode_str;
 use serde_json::{Value, json};
@@ -76,9 +76,22 @@ pub(super) fn parse(
             return Err(Error::format(path, message));
         }
     }
+    // Nobody here reads these, which the crate checks: exporters write numbers that mean nothing.
+    root.samplers.iter_mut().for_each(|sampler| *sampler = Sampler::default());
+    for view in &mut root.buffer_views {
+        view.target = None;
+        // Below the smallest stride elements lie without gaps.
+        view.byte_stride.take_if(|stride| stride.0 < 4);
+    }
     // Attributes of applications are no part of the picture, but the crate refuses their names.
     for primitive in root.meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {
         primitive.attributes.retain(|name, _| matches!(name, Checked::Valid(_)));
+        let positions = Checked::Valid(Semantic::Positions);
+        if !primitive.attributes.contains_key(&positions) && !root.accessors.is_empty() {
+            // One without positions shows nothing: as points it is left out with a warning.
+            primitive.attributes.insert(positions, Index::new(0));
+            primitive.mode = Checked::Valid(Mode::Points);
+        }
     }
     complete_positions(path, &mut root)?;
     if let Some(name) = variant {

@@ -41,6 +41,8 @@ impl Scalar {
             "ushort" | "uint16" => (Kind::Unsigned, 2),
             "int" | "int32" => (Kind::Signed, 4),
             "uint" | "uint32" => (Kind::Unsigned, 4),
+            "long" | "int64" => (Kind::Signed, 8),
+            "ulong" | "uint64" => (Kind::Unsigned, 8),
             "float" | "float32" => (Kind::Float, 4),
             "double" | "float64" => (Kind::Float, 8),
             _ => return None,
@@ -55,10 +57,10 @@ impl Scalar {
             Kind::Unsigned => 8 * self.byte_count,
             Kind::Float => return None,
         };
-        Some(((1_u64 << bits) - 1) as f64)
+        Some((u64::MAX >> (64 - bits)) as f64)
     }
 
-    /// Value of little-endian bytes, with zeros after its own; every type fits a double exactly.
+    /// Value of little-endian bytes, with zeros after its own; every index fits a double exactly.
     pub(super) fn value(self, bytes: [u8; 8]) -> f64 {
         let word = u64::from_le_bytes(bytes);
         let unused_bits = 64 - 8 * self.byte_count;
@@ -99,12 +101,12 @@ impl Element {
 }
 
 impl Source<'_> {
-    fn header_line(&mut self) -> Result<String> {
+    fn header_line(&mut self, end: u8) -> Result<String> {
         let mut bytes = Vec::new();
         self.reader
             .by_ref()
             .take(MAX_HEADER_LINE_BYTES)
-            .read_until(b'\n', &mut bytes)
+            .read_until(end, &mut bytes)
             .map_err(|source| Error::io(self.path, "read", source))?;
         if bytes.is_empty() {
             return Err(self.error("truncated: the file ends before `end_header`"));
@@ -115,7 +117,12 @@ impl Source<'_> {
 
     /// Reads up to and including `end_header`, and sets the encoding.
     pub(super) fn read_header(&mut self) -> Result<Vec<Element>> {
-        let magic = self.header_line()?;
+        let start =
+            self.reader.fill_buf().map_err(|source| Error::io(self.path, "read", source))?;
+        // Lines of old Macs end in a carriage return.
+        let is_old = start.starts_with(b"ply\r") && !start.starts_with(b"ply\r\n");
+        let end = if is_old { b'\r' } else { b'\n' };
+        let magic = self.header_line(end)?;
         if magic != "ply" {
             let start: String = magic.chars().take(16).collect();
             return Err(
@@ -126,7 +133,7 @@ impl Source<'_> {
         let mut encoding = None;
         loop {
             self.line += 1;
-            let text = self.header_line()?;
+            let text = self.header_line(end)?;
             let words: Vec<&str> = text.split_whitespace().collect();
             match words.as_slice() {
                 ["format", name, version] => {
