@@ -39,7 +39,7 @@ use crate::{
 };
 
 /// Primaries and white point of ITU-R BT.709 (red, green, blue, white; CIE x, y).
-const REC_709: Chromaticities = Chromaticities {
+pub(crate) const REC_709: Chromaticities = Chromaticities {
     red: Vec2(0.64, 0.33),
     green: Vec2(0.30, 0.60),
     blue: Vec2(0.15, 0.06),

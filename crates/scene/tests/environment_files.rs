@@ -3,8 +3,13 @@
 
 use std::{fs, path::Path};
 
-use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
+use exr::{
+    math::Vec2 as ExrVec2,
+    meta::attribute::Chromaticities,
+    prelude::{
+        AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes,
+        SpecificChannels, WritableImage,
+    },
 };
 use fenestra_scene::{
     environment::{
@@ -188,6 +193,56 @@ fn other_ratios_are_warned_of() {
     let (map, warnings) = load(&path);
     assert!(warnings.len() == 1 && warnings[0].contains("4×8"), "{warnings:?}");
     assert!((EnvironmentTables::new(&map).total).is_normal());
+}
+
+/// Headers as cameras, painters and Blender write them.
+#[test]
+fn what_headers_say_of_colours_and_windows_is_named() {
+    let folder = Folder::new();
+    let hdr = hdr_bytes(8, 4, &texels());
+    let with = |line: &str| {
+        let bytes = [b"#?RADIANCE\n", line.as_bytes(), &hdr["#?RADIANCE".len()..]].concat();
+        let (map, warnings) = load(&folder.write("map.hdr", bytes));
+        assert_eq!(map.texels, texels(), "{line}");
+        warnings.concat()
+    };
+    let own = "PRIMARIES=0.640 0.330 0.290 0.600 0.150 0.060 0.333 0.333";
+    assert_eq!(with(&format!("EXPOSURE=1\n{own}")), "");
+    assert!(with("EXPOSURE=2").contains("not divided by `EXPOSURE`"));
+    assert!(with("COLORCORR=1 2 1").contains("and `COLORCORR`"));
+    assert!(with(&own.replace("0.290", "0.170")).contains("of other primaries"));
+
+    let component = |c: usize| texels().iter().map(move |texel| texel[c]).collect::<Vec<f32>>();
+    let path = folder.path().join("layers.exr");
+    let layer = |name, c: usize| (name, FlatSamples::F32(component(c)));
+    let black = |name| (name, FlatSamples::F32(vec![0.0; 32]));
+    let emission = [black("a.Emit.R"), black("a.Emit.G"), black("a.Emit.B"), black("a.Depth.Z")];
+    let combined = [layer("b.Combined.R", 0), layer("b.Combined.G", 1), layer("b.Combined.B", 2)];
+    write_exr(&path, emission.into_iter().chain(combined).collect());
+    let (map, warnings) = load(&path);
+    assert_eq!(map.texels, texels());
+    assert!(
+        warnings.concat().contains("that of the channel `b.Combined.R` is read"),
+        "{warnings:?}"
+    );
+
+    let path = folder.path().join("windows.exr");
+    let colors = SpecificChannels::rgb(|at: ExrVec2<usize>| {
+        let [r, g, b] = texel(at.x() + 8 * at.y()).to_array();
+        (r, g, b)
+    });
+    let mut image = Image::from_channels((8, 4), colors);
+    let point = |x, y| ExrVec2(x, y);
+    let (red, green, blue) = (point(0.713, 0.293), point(0.165, 0.83), point(0.128, 0.044));
+    image.attributes.chromaticities =
+        Some(Chromaticities { red, green, blue, white: point(0.3217, 0.3377) });
+    image.attributes.display_window.size = ExrVec2(9, 4);
+    image.write().to_file(&path).unwrap();
+    let (map, warnings) = load(&path);
+    assert_eq!(map.texels, texels());
+    let [window, primaries] = &warnings[..] else { panic!("{warnings:?}") };
+    assert!(window.contains("its display window is taken to be its data window"), "{window}");
+    assert!(primaries.contains("its colours are of other primaries"), "{primaries}");
 }
 
 #[test]

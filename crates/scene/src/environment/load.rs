@@ -78,15 +78,15 @@ impl EnvironmentMap {
         let (extension, name) = (files::extension(path), path.display().to_string());
         let begins = |signature: &[u8]| bytes.starts_with(signature);
         let image = if begins(exr::SIGNATURE) {
-            read_exr(&bytes)
+            read_exr(&name, &bytes, warnings)
         } else if begins(RADIANCE_SIGNATURE) {
-            floats::radiance(&bytes, check)
+            floats::radiance(&name, &bytes, check, warnings)
         } else if PFM_SIGNATURES.into_iter().any(begins) {
             floats::pfm(&bytes, check)
         } else {
             match extension.as_str() {
-                "exr" => read_exr(&bytes),
-                "hdr" | "pic" | "rgbe" => floats::radiance(&bytes, check),
+                "exr" => read_exr(&name, &bytes, warnings),
+                "hdr" | "pic" | "rgbe" => floats::radiance(&name, &bytes, check, warnings),
                 "pfm" => floats::pfm(&bytes, check),
                 _ => read_encoded(&name, &bytes, warnings),
             }
@@ -140,14 +140,14 @@ fn check_size(width: u64, height: u64) -> Result<(), String> {
         .map_err(|shortage| shortage.to_string())
 }
 
-fn read_exr(bytes: &[u8]) -> Result<RgbImage, String> {
+fn read_exr(name: &str, bytes: &[u8], warnings: &mut Vec<String>) -> Result<RgbImage, String> {
     let check = |size: [u64; 2], pixel_bytes: u64| {
         check_size(size[0], size[1])?;
         files::check_promise(size, pixel_bytes, bytes.len() as u64, files::EXR_LARGEST_RATIO)
             .map_err(|message| format!("not a readable OpenEXR file: {message}"))
     };
     let pixel = |(): &mut (), [r, g, b, _]: [f32; 4]| [r, g, b];
-    exr::decode(bytes, check, pixel).map(|([width, height], pixels, ())| RgbImage {
+    exr::decode(name, bytes, check, pixel, warnings).map(|([width, height], pixels, ())| RgbImage {
         width,
         height,
         pixels,

@@ -83,13 +83,18 @@ fn decode(
     };
     let ratio = match guessed {
         Some(ImageFormat::Hdr) => {
-            return Texture::of_image(name, &floats::radiance(bytes, check)?, warnings);
+            return Texture::of_image(
+                name,
+                &floats::radiance(name, bytes, check, warnings)?,
+                warnings,
+            );
         }
         Some(ImageFormat::OpenExr) => {
             let check = |size: [u64; 2], texel_bytes: u64| {
                 check_size(size, texel_bytes, bytes.len(), files::EXR_LARGEST_RATIO)
             };
-            let ([width, height], texels, repairs) = exr::decode(bytes, check, Repairs::texel)?;
+            let ([width, height], texels, repairs) =
+                exr::decode(name, bytes, check, Repairs::texel, warnings)?;
             repairs.warn(name, warnings);
             let texels = Texels::Halves(texels);
             return Ok(Texture { name: name.to_owned(), width, height, texels });

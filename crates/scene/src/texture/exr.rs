@@ -5,8 +5,11 @@ use std::io::Cursor;
 use bytemuck::Zeroable;
 use exr::{
     math::Vec2,
+    meta::header::Header,
     prelude::{ReadChannels, ReadLayers, ReadSpecificChannel},
 };
+
+use super::floats::warn_of_primaries;
 
 /// First bytes of an OpenEXR file.
 pub(crate) const SIGNATURE: &[u8] = &exr::meta::magic_number::BYTES;
@@ -27,35 +30,61 @@ impl<T: Zeroable, N: Default> Canvas<T, N> {
 }
 
 /// Decodes the first layer with the channels R, G, B, else the first with Y, to texels that `texel` makes of
-/// colour and opacity; returns width and height too, and the notes that `texel` keeps.
+/// colour and opacity; returns width and height too, and the notes that `texel` keeps. Warns, with `name`,
+/// of colours and windows that are taken for others.
 ///
 /// `check_size` is asked with the size and the bytes of a pixel before memory is allocated.
 pub(crate) fn decode<T: Zeroable + 'static, N: Default + 'static>(
+    name: &str,
     bytes: &[u8],
     check_size: impl Fn([u64; 2], u64) -> Result<(), String>,
     texel: fn(&mut N, [f32; 4]) -> T,
+    warnings: &mut Vec<String>,
 ) -> Result<([u32; 2], Vec<T>, N), String> {
     let unreadable = |error: exr::error::Error| format!("not a readable OpenEXR file: {error}");
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false);
     let meta = meta.map_err(unreadable)?;
-    let has = |name: &str| {
-        let flat = meta.headers.iter().filter(|header| !header.deep);
-        flat.flat_map(|header| &header.channels.list).any(|channel| channel.name.eq(name))
+    let names: Vec<String> = (meta.headers.iter())
+        .flat_map(|header| &header.channels.list)
+        .map(|channel| channel.name.to_string())
+        .collect();
+    let with = |names: &[String]| {
+        let has = |header: &Header, name: &String| {
+            header.channels.list.iter().any(|channel| channel.name.eq(name))
+        };
+        let mut flat = meta.headers.iter().filter(|header| !header.deep);
+        flat.find(|header| names.iter().all(|name| has(header, name)))
     };
-    let is_color = has("R") && has("G") && has("B");
-    if !is_color && !has("Y") {
-        let channels = meta.headers.iter().flat_map(|header| &header.channels.list);
-        let found: Vec<String> = channels.map(|channel| channel.name.to_string()).collect();
-        return Err(format!("expected the channels R, G, B or Y, found {}", found.join(", ")));
+    // Some programs begin the names of channels by those of their layers; Blender's picture is `Combined`.
+    let mut layers: Vec<&str> = names.iter().filter_map(|name| name.strip_suffix('R')).collect();
+    layers.retain(|layer| layer.is_empty() || layer.ends_with('.'));
+    layers.sort_by_key(|layer| (!layer.is_empty(), !layer.ends_with("Combined.")));
+    let colors = layers.iter().find_map(|layer| {
+        let colors = ["R", "G", "B"].map(|channel| format!("{layer}{channel}"));
+        Some((with(&colors)?, colors, format!("{layer}A")))
+    });
+    let grey = ["Y".to_owned()];
+    let header = colors.as_ref().map(|(header, ..)| *header).or_else(|| with(&grey));
+    let Some(header) = header else {
+        return Err(format!("expected the channels R, G, B or Y, found {}", names.join(", ")));
+    };
+    if let Some((_, [red, ..], _)) = colors.as_ref().filter(|(_, [red, ..], _)| red != "R") {
+        warnings.push(format!("{name}: of its layers, that of the channel `{red}` is read"));
+    }
+    if header.data_window() != header.shared_attributes.display_window {
+        warnings.push(format!("{name}: its display window is taken to be its data window"));
+    }
+    if let Some(found) = header.shared_attributes.chromaticities {
+        let points = [found.red, found.green, found.blue, found.white];
+        warn_of_primaries(name, points.map(|Vec2(x, y)| [x, y]), warnings);
     }
     for header in &meta.headers {
         let size = [header.layer_size.width() as u64, header.layer_size.height() as u64];
         check_size(size, header.channels.bytes_per_pixel as u64)?;
-        let names = ["R", "G", "B", "A", "Y"];
-        for channel in &header.channels.list {
-            if names.iter().any(|name| channel.name.eq(name)) && channel.sampling != Vec2(1, 1) {
-                return Err(format!("channel {} is subsampled, which is not read", channel.name));
-            }
+    }
+    for channel in &header.channels.list {
+        if channel.sampling != Vec2(1, 1) {
+            return Err(format!("channel {} is subsampled, which is not read", channel.name));
         }
     }
     let channels = exr::prelude::read().no_deep_data().largest_resolution_level();
@@ -63,9 +92,9 @@ pub(crate) fn decode<T: Zeroable + 'static, N: Default + 'static>(
     let read = Cursor::new(bytes);
     // The two readers are of different types.
     macro_rules! pixels {
-        ($channels:expr, $values:ident: $kind:ty => $texel:expr) => {
+        ($channels:expr, $alpha:expr, $values:ident: $kind:ty => $texel:expr) => {
             $channels
-                .optional("A", 1.0)
+                .optional($alpha, 1.0)
                 .collect_pixels(
                     |size, _| Canvas::new(size),
                     move |canvas: &mut Canvas<T, N>, at, $values: $kind| {
@@ -82,11 +111,11 @@ pub(crate) fn decode<T: Zeroable + 'static, N: Default + 'static>(
                 .pixels
         };
     }
-    let canvas = if is_color {
-        let colors = channels.required("R").required("G").required("B");
-        pixels!(colors, values: (f32, f32, f32, f32) => values.into())
+    let canvas = if let Some((_, [red, green, blue], alpha)) = &colors {
+        let colors = channels.required(&**red).required(&**green).required(&**blue);
+        pixels!(colors, &**alpha, values: (f32, f32, f32, f32) => values.into())
     } else {
-        pixels!(channels.required("Y"), values: (f32, f32) => {
+        pixels!(channels.required("Y"), "A", values: (f32, f32) => {
             let (grey, alpha) = values;
             [grey, grey, grey, alpha]
         })

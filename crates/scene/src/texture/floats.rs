@@ -4,7 +4,10 @@ use std::io::Cursor;
 
 use image::{ImageDecoder, ImageError, codecs::hdr::HdrDecoder};
 
-use crate::{files, picture::RgbImage};
+use crate::{
+    files,
+    picture::{REC_709, RgbImage},
+};
 
 /// Largest compression of a Radiance file: a run of 255 texels of four bytes in four bytes.
 const RADIANCE_LARGEST_RATIO: u64 = 255;
@@ -14,13 +17,46 @@ pub(crate) const PFM_SIGNATURES: [&[u8]; 2] = [b"PF", b"Pf"];
 /// First bytes of a Radiance file, of whichever program: `#?RADIANCE`, `#?RGBE`.
 pub(crate) const RADIANCE_SIGNATURE: &[u8] = b"#?";
 
-/// Reads a Radiance file; `check_size` is asked before memory is allocated.
+/// Largest difference of a chromaticity from that of Rec.709 that no warning names: that of the white of
+/// Radiance, which is of equal energy.
+const ALIKE: f32 = 0.025;
+
+/// Warns of the chromaticities of red, green, blue and white where they are not those of Rec.709.
+pub(super) fn warn_of_primaries(name: &str, found: [[f32; 2]; 4], warnings: &mut Vec<String>) {
+    let own = [REC_709.red, REC_709.green, REC_709.blue, REC_709.white];
+    let own = own.map(|point| [point.x(), point.y()]);
+    let pairs = found.as_flattened().iter().zip(own.as_flattened());
+    if pairs.map(|(found, own)| (found - own).abs()).any(|apart| apart > ALIKE) {
+        warnings
+            .push(format!("{name}: its colours are of other primaries, and are taken for Rec.709"));
+    }
+}
+
+/// Reads a Radiance file; `check_size` is asked before memory is allocated. Warns, with `name`, of what
+/// the header says of its values.
 pub(crate) fn radiance(
+    name: &str,
     bytes: &[u8],
     check_size: impl Fn([u64; 2]) -> Result<(), String>,
+    warnings: &mut Vec<String>,
 ) -> Result<RgbImage, String> {
     let message = |error: ImageError| format!("not a readable Radiance file: {error}");
     let decoder = HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(message)?;
+    let header = decoder.metadata();
+    // Other renderers take the values as they stand too.
+    if header.exposure.is_some_and(|exposure| exposure != 1.0)
+        || header.color_correction.is_some_and(|factors| factors != (1.0, 1.0, 1.0))
+    {
+        warnings.push(format!("{name}: its values are not divided by `EXPOSURE` and `COLORCORR`"));
+    }
+    let primaries = header.custom_attributes.iter().find(|(key, _)| key == "PRIMARIES");
+    if let Some((_, text)) = primaries {
+        let numbers: Vec<f32> =
+            text.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        if let [[red, green, blue, white]] = numbers.as_chunks().0.as_chunks().0 {
+            warn_of_primaries(name, [*red, *green, *blue, *white], warnings);
+        }
+    }
     let (width, height) = decoder.dimensions();
     let size = [width, height].map(u64::from);
     check_size(size)?;
