@@ -11,6 +11,7 @@ use std::{
 use fenestra_scene::{
     Camera, Filter, Geometry, Scene,
     coat::albedo_below_coat,
+    instance::Instance,
     lamp::{LampKind, SpotFalloff},
     load::LoadOptions,
     material::{Anisotropy, ConductorFresnel, Material, MaterialKind},
@@ -1237,6 +1238,34 @@ fn other_files_are_included_plain_and_compressed() {
     assert!(refused("c.pbrt", "Include \"no.pbrt\"").contains("no.pbrt: cannot read"));
 }
 
+/// Pictures of particles are files of a ball for each.
+#[test]
+fn thousands_of_balls_are_copies_of_one() {
+    let ball = |index: usize| {
+        let (radius, turned) = (1 + index % 3, ["", "ReverseOrientation"][index / 2 % 2]);
+        let material = format!("Material \"diffuse\" \"rgb reflectance\" [{} 0 0]", index % 2);
+        format!(
+            "AttributeBegin Translate {index} 0 0 {turned} {material} \
+             Shape \"sphere\" \"float radius\" {radius} AttributeEnd\n"
+        )
+    };
+    let part = "Shape \"sphere\" \"float zmin\" 0 AreaLightSource \"diffuse\" Shape \"sphere\"";
+    let geometry = world(&((0..400).map(ball).collect::<String>() + part)).geometry;
+    assert_eq!((geometry.prototypes.len(), geometry.instances.len()), (2, 400 - 65));
+    // Copies are as large as the file says, whatever the first one was.
+    let end = |ball: &Instance| {
+        let positions = &geometry.prototypes[ball.prototype as usize].positions;
+        let places = positions
+            .iter()
+            .map(|&own| ball.affine().transform_point3(DVec3::from(own.map(f64::from))));
+        places.map(|place| place.x).fold(f64::MIN, f64::max)
+    };
+    let ends = geometry.instances[332..].iter().map(end).collect::<Vec<_>>();
+    for (end, expected) in ends.iter().zip([399.0, 401.0, 400.0]) {
+        assert!((end - expected).abs() < 1e-3, "{ends:?}");
+    }
+}
+
 /// Directives as exporters and the scenes of pbrt-v4 write them, by the source of pbrt-v4.
 #[test]
 fn files_of_others_mean_what_pbrt_takes_them_for() {
@@ -1246,6 +1275,9 @@ fn files_of_others_mean_what_pbrt_takes_them_for() {
     let none = r#"Sampler "independent" "integer pixelsamples" 0"#;
     assert_eq!(load(none, TRIANGLE).asked.samples, None);
     let integrator = r#"Integrator "path" "bool regularize" true "integer maxdepth" 3"#;
+    let deep = load(&format!("Integrator \"path\" \"integer maxdepth\" 65 {MIRRORED}"), "");
+    assert_eq!(deep.asked.depth, Some(64));
+    assert!(warnings(&deep)[0].contains("`maxdepth` above 64 (line 1)"), "{:?}", warnings(&deep));
     let regularized = load(&format!("{integrator} {MIRRORED}"), "");
     assert_eq!(regularized.asked.depth, Some(3));
     assert!(warnings(&regularized)[0].contains("`regularize` of Integrator"));

@@ -28,7 +28,7 @@ use std::{collections::HashMap, path::Path, rc::Rc};
 
 use camera::View;
 use directives::{Description, Reader, Shape};
-use glam::{DMat4, Vec3};
+use glam::{DMat4, DVec3, Vec3};
 use lights::Lights;
 use materials::{Materials, set_opacity};
 use parameters::{Entity, Log};
@@ -89,6 +89,7 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
         dropped: Dropped::default(),
         triangle_count: 0,
         budget: Budget::default(),
+        balls: [None; 2],
         strands: shapes::detail(
             (description.objects.iter().flat_map(|object| &object.shapes))
                 .chain(&shapes)
@@ -96,7 +97,9 @@ pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
         ),
     };
     for shape in shapes {
-        if let Some((mesh, material)) = builder.prepare(&shape, false)? {
+        if let Some((mesh, material)) = builder.prepare(&shape, false)?
+            && !builder.share_ball(&mesh, material, &shape)?
+        {
             builder.place(&mesh, material, &shape, DMat4::IDENTITY)?;
         }
     }
@@ -156,6 +159,12 @@ fn asked(description: &Description, log: &mut Log) -> Asked {
     let samples = number(&description.sampler, "pixelsamples").or_else(of_strata);
     // pbrt's own depth where the file states none.
     let depth = number(&description.integrator, "maxdepth").unwrap_or(5);
+    if depth > Asked::MAX_DEPTH
+        && let Some(entity) = &description.integrator
+    {
+        let name = format!("`maxdepth` above {}", Asked::MAX_DEPTH);
+        log.ignore_named(features::PBRT_INTEGRATOR, &name, &entity.place);
+    }
     let asked = Asked {
         samples: samples.filter(|samples| *samples > 0),
         depth: Some(depth.clamp(1, Asked::MAX_DEPTH)),
@@ -193,6 +202,8 @@ struct Builder<'a> {
     dropped: Dropped,
     triangle_count: usize,
     budget: Budget,
+    /// Prototypes of spheres with their radii: as they are, and turned inside out.
+    balls: [Option<(u32, f64)>; 2],
     strands: Detail,
 }
 
@@ -323,6 +334,31 @@ impl Builder<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Adds a sphere as a copy of the first; false for a shape that is none, or is to be placed. Pictures of
+    /// point clouds have thousands.
+    fn share_ball(&mut self, mesh: &Mesh, material: u32, shape: &Shape) -> Result<bool> {
+        let entity = &shape.entity;
+        let is_whole = ["zmin", "zmax", "phimax"].iter().all(|part| entity.find(part).is_none());
+        let is_ball = entity.name == "sphere" && is_whole && mesh.tangents.is_empty();
+        let emits = self.made[material as usize].surface.emission.is_some();
+        if !is_ball || emits || !self.budget.takes_instances(1, mesh.triangles.len()) {
+            return Ok(false);
+        }
+        let radius = entity.number("radius", 1.0)?;
+        let kind = usize::from(shape.state.reverse);
+        let (prototype, own) = *self.balls[kind].get_or_insert_with(|| {
+            let (prototype, dropped) = self.geometry.add_prototype(mesh, |_| 0);
+            self.dropped.add(dropped);
+            (prototype.index, radius)
+        });
+        let grown = DMat4::from_scale(DVec3::splat(radius / own));
+        let transform = Transform::from_matrix(self.view.mirror * shape.state.ctm * grown);
+        let instance = transform.and_then(|own| Instance::new(prototype, &own, material, true));
+        let instance = instance.filter(|_| self.geometry.instances.len() < MAX_INSTANCES);
+        self.geometry.instances.extend(instance);
+        Ok(instance.is_some())
     }
 
     /// Checks, before any is placed, that so many copies of a mesh can be used.
