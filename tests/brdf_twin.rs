@@ -149,7 +149,7 @@ fn scattering_in_the_shader_agrees_with_its_twin() {
         let (outgoing_local, u) = (hemisphere(index, 11), uniform(index, 12));
         let distance = uniform(index, 13).x;
         let mut incident_local = hemisphere(index, 14);
-        incident_local.z *= if index / 6 % 2 == 0 { 1.0 } else { -1.0 };
+        incident_local.z *= if (index / 6).is_multiple_of(2) { 1.0 } else { -1.0 };
         let is_back = index / 3 % 2;
         SpecularQuery { outgoing_local, u, material, is_back, distance, incident_local }
     };
