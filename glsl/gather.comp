@@ -17,7 +17,7 @@ UPDATES(paths)
 void gather_path(uint path) {
     uint path_count = wave_path_count();
     Hit hit = load_hit(path);
-    if (hit.material == NO_MATERIAL && !(wave.to_lamps != 0u && hit.triangle != NO_TRIANGLE)) {
+    if (!has_shadow_rays(hit)) {
         Ray ray = load_ray(path);
         bool is_first = wave.first_shadow_ray == 0u && wave.to_lamps == 0u;
         uint rays = wave.arriving_shadow_rays;

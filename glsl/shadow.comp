@@ -20,9 +20,7 @@ bool start_ray(uint place, uint path_count, float offset) {
     ListedRay listed = listed_ray(place, path_count);
     Hit hit = load_hit(listed.path);
     ShadowRay ray = load_shadow_ray(listed.ray);
-    bool is_lit = hit.material != NO_MATERIAL
-        || (wave.to_lamps != 0u && hit.triangle != NO_TRIANGLE);
-    bool is_traced = is_lit && ray.contribution != vec3(0.0);
+    bool is_traced = has_shadow_rays(hit) && ray.contribution != vec3(0.0);
     vec3 origin = moved_off_surface(hit.position, hit.geometric_normal, ray.direction, offset);
     float farthest = FAR_AWAY;
     if (wave.to_lamps != 0u) {

@@ -4,7 +4,7 @@
 // Directions are unit vectors in the shading frame (z is the normal) and point away from the
 // surface. Values are per steradian without the cosine; pdfs are per steradian of incident
 // directions. Both are 0 unless both directions are above the surface, and for mirrors, dielectrics and
-// thin panes, at which no light is sampled: see specular.glsl.
+// thin panes: see specular.glsl.
 
 #include "frame.glsl"
 #include "fresnel.glsl"

@@ -58,11 +58,16 @@ float fresnel_interface(float cosine, float eta) {
     return refracted > 0.0 ? min(1.0, reflectance) : 1.0;
 }
 
-// Light that a thin pane reflects, R + T²R + T²R³ + … = 2R/(1 + R) for T = 1 − R at each of its two
-// sides, times its factor. `cosine` may have either sign.
-vec3 pane_reflectance(Material material, float cosine) {
+// Share of light that a thin pane reflects, R + T²R + T²R³ + … = 2R/(1 + R) for T = 1 − R at each of its two
+// sides. `cosine` may have either sign.
+float pane_share(Material material, float cosine) {
     float reflectance = fresnel_interface(abs(cosine), material.ior);
-    return 2.0 * reflectance / (1.0 + reflectance) * material.reflectance;
+    return 2.0 * reflectance / (1.0 + reflectance);
+}
+
+// The same times its factor.
+vec3 pane_reflectance(Material material, float cosine) {
+    return pane_share(material, cosine) * material.reflectance;
 }
 
 // Light that a thin pane lets straight through, (1 − R)/(1 + R), times its factor.

@@ -34,11 +34,8 @@ float relative_index(Material material, bool is_back) {
 
 // Light that an interface or a pane reflects at a cosine with the normal of a microfacet.
 float facet_reflectance(Material material, float cosine, float eta) {
-    if (is_kind(material, MATERIAL_ROUGH_PANE)) {
-        float once = fresnel_interface(abs(cosine), material.ior);
-        return 2.0 * once / (1.0 + once);
-    }
-    return fresnel_interface(cosine, eta);
+    return is_kind(material, MATERIAL_ROUGH_PANE) ? pane_share(material, cosine)
+                                                  : fresnel_interface(cosine, eta);
 }
 
 // Mirrors a direction at the surface: a pane lets through what it reflects, mirrored.

@@ -18,7 +18,7 @@ const bool HAS_BECKMANN = (SURFACES & SURFACES_BECKMANN) != 0u;
 const bool HAS_ROUGH_GLASS = (SURFACES & SURFACES_ROUGH_GLASS) != 0u;
 const bool IS_ANISOTROPIC = (SURFACES & SURFACES_ANISOTROPIC) != 0u;
 
-// Tests whether a kind of material is specular: no light is sampled at it.
+// Tests whether a kind of material is specular: no sampler draws light at it.
 bool is_specular(uint kind) {
     return HAS_SPECULAR && ((1u << kind) & SPECULAR_KINDS) != 0u;
 }

@@ -41,6 +41,12 @@ struct PathIndex {
     bool inside;
 };
 
+// Tests whether a path has shadow rays. Those to lamps may start at specular surfaces too, and carry nothing
+// where these are not rough.
+bool has_shadow_rays(Hit hit) {
+    return hit.material != NO_MATERIAL || (wave.to_lamps != 0u && hit.triangle != NO_TRIANGLE);
+}
+
 uint wave_path_count() {
     return wave.pixel_count * wave.sample_count;
 }

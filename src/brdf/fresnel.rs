@@ -57,11 +57,16 @@ pub fn fresnel_interface(cosine: f32, eta: f32) -> f32 {
     if refracted > 0.0 { reflectance.min(1.0) } else { 1.0 }
 }
 
-/// Light that a thin pane reflects, R + T²R + T²R³ + … = 2R/(1 + R) for T = 1 − R at each of its two
-/// sides, times its factor. `cosine` may have either sign.
-pub fn pane_reflectance(material: &Material, cosine: f32) -> Vec3 {
+/// Share of light that a thin pane reflects, R + T²R + T²R³ + … = 2R/(1 + R) for T = 1 − R at each of its two
+/// sides. `cosine` may have either sign.
+pub fn pane_share(material: &Material, cosine: f32) -> f32 {
     let reflectance = fresnel_interface(cosine.abs(), material.ior);
-    2.0 * reflectance / (1.0 + reflectance) * Vec3::from(material.reflectance)
+    2.0 * reflectance / (1.0 + reflectance)
+}
+
+/// The same times its factor.
+pub fn pane_reflectance(material: &Material, cosine: f32) -> Vec3 {
+    pane_share(material, cosine) * Vec3::from(material.reflectance)
 }
 
 /// Light that a thin pane lets straight through, (1 − R)/(1 + R), times its factor.

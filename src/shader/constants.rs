@@ -134,7 +134,7 @@ constants! {
     SAMPLER_RIS = 5;
 
     // Bits of CONSTANT_SURFACES.
-    /// Some surfaces reflect or transmit by paths alone: no light is sampled at them.
+    /// Some surfaces reflect or transmit by paths: no sampler draws light at them.
     SURFACES_SPECULAR = 1;
     /// Some surfaces let light straight through.
     SURFACES_PASSING = 2;
@@ -208,7 +208,7 @@ constants! {
     TRAVERSAL_STEP_LIMIT = 30_000;
     /// Packed normal of the vertices of a flat triangle, which no unit vector packs to.
     FLAT_NORMAL = 0x8000_8000;
-    /// [`Hit::material`](super::structs::Hit::material) where no light is sampled: the ray left the
+    /// [`Hit::material`](super::structs::Hit::material) where no sampler draws light: the ray left the
     /// scene, was not traced, or met a specular surface, which `Hit::triangle` tells apart.
     NO_MATERIAL = 0xffff_ffff;
     /// [`Hit::triangle`](super::structs::Hit::triangle) of a ray that met nothing.

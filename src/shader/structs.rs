@@ -143,7 +143,7 @@ structs! {
     struct Hit {
         /// Point on the triangle, metres, from barycentric coordinates.
         position: vec3,
-        /// Material index, or `NO_MATERIAL` where no light is sampled.
+        /// Material index, or `NO_MATERIAL` where no sampler draws light.
         material: uint,
         /// Unit normal of the triangle, turned toward the ray's origin.
         geometric_normal: vec3,
@@ -251,7 +251,7 @@ structs! {
     struct FirstVertex {
         /// Point on the surface, metres.
         position: vec3,
-        /// Material index, or `NO_MATERIAL` where no light is sampled.
+        /// Material index, or `NO_MATERIAL` where no sampler draws light.
         material: uint,
         /// Unit normal of the triangle on the viewer's side.
         geometric_normal: vec3,

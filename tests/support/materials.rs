@@ -219,7 +219,7 @@ pub fn tables() -> &'static MaterialTables {
     })
 }
 
-/// Returns every kind at which no light is sampled: tinted and not, smooth and rough, of indices above
+/// Returns every specular kind: tinted and not, smooth and rough, of indices above
 /// and below 1.
 pub fn specular_materials() -> Vec<Material> {
     let tint = vec3(0.9, 0.6, 0.3);

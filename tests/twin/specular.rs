@@ -1,6 +1,6 @@
 //! Twin of `glsl/include/specular.glsl` and of what it alone needs of `ggx.glsl`: same names, same order.
-//! Mirrors, dielectrics and thin panes: materials at which paths go on in a sampled direction, and no light
-//! is sampled.
+//! Mirrors, dielectrics and thin panes: materials at which paths go on in a sampled direction, and no sampler
+//! draws light; `sample_lamps` does where they are rough.
 //!
 //! Directions are unit vectors in the shading frame, whose z points to the side of the viewer, and
 //! point away from the surface: transmitted ones have z < 0. Values are per steradian without the
@@ -10,7 +10,9 @@
 //! an interface is scaled by (index of the viewer's side / index of the light's side)², so that light
 //! that goes in and out again has its former radiance. Values of importance would lack this factor.
 
-pub use fenestra::brdf::fresnel::{fresnel_interface, pane_reflectance, pane_transmittance};
+pub use fenestra::brdf::fresnel::{
+    fresnel_interface, pane_reflectance, pane_share, pane_transmittance,
+};
 use fenestra::{
     brdf::{fresnel::refracted_cosine, ggx::*},
     math::colour::luminance,
@@ -62,11 +64,10 @@ pub fn relative_index(material: &Material, is_back: bool) -> f32 {
 
 /// Light that an interface or a pane reflects at a cosine with the normal of a microfacet.
 fn facet_reflectance(material: &Material, cosine: f32, eta: f32) -> f32 {
-    if material.kind == MATERIAL_ROUGH_PANE {
-        let once = fresnel_interface(cosine.abs(), material.ior);
-        return 2.0 * once / (1.0 + once);
+    match material.kind {
+        MATERIAL_ROUGH_PANE => pane_share(material, cosine),
+        _ => fresnel_interface(cosine, eta),
     }
-    fresnel_interface(cosine, eta)
 }
 
 /// Mirrors a direction at the surface.

@@ -352,8 +352,8 @@ impl MaterialKind {
         matches!(self, Self::Dielectric { .. } | Self::ThinDielectric { .. })
     }
 
-    /// True if no light is sampled at the material, since all of what it sends on comes from one
-    /// direction or from behind: paths follow it.
+    /// True if no sampler draws light at the material, since what it sends on comes from one direction or
+    /// from behind: paths follow it.
     pub fn is_specular(&self) -> bool {
         self.is_glass() || matches!(self, Self::Mirror { .. })
     }

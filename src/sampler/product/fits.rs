@@ -44,7 +44,7 @@ pub struct Fits {
 impl Fits {
     /// Fits the environment and every material, or takes the fits from the user's cache, and
     /// uploads them. A black map or material, which cannot be fitted, gets no lobes and a warning;
-    /// materials at which no light is sampled get none.
+    /// specular materials get none.
     /// Fails if numbers of lobes or views are out of range, or if the device fails.
     pub fn new(
         device: &Arc<Device>,
