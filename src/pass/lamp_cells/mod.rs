@@ -5,7 +5,11 @@
 //! Departs from a light tree \[Conty Estevez & Kulla 2018\] by knowing what is blocked: lamps behind a wall
 //! are as near as those before it.
 
-use std::{collections::BTreeMap, f32::consts::PI, ops::Range};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    f32::consts::PI,
+    ops::Range,
+};
 
 use glam::{UVec3, Vec3};
 use rayon::prelude::*;
@@ -24,7 +28,7 @@ use crate::{
         equal_area::direction_from_square,
         random::{hash_4d, unit_float},
     },
-    scene::Scene,
+    scene::{Camera, Scene},
     shader::{
         constants::{
             LAMP_BIT, LAMP_DIRECTIONAL, LAMP_POINT, LAMP_SPOT_LINEAR_ANGLE,
@@ -37,14 +41,16 @@ use crate::{
 
 /// Cube faces that a normal can be nearest to.
 const FACES: usize = 6;
-/// Walks through the scene that find its surfaces, and places of each.
+/// Walks from the camera that find surfaces, and as many from lamps and triangles; places of each.
 const WALKS: u32 = 1 << 14;
 const WALK_PLACES: u32 = 4;
+/// Edges of the square that walks from the camera go through, in heights of the image.
+const VIEW: f32 = 2.0;
 /// Most cells with surfaces.
 const MOST_CELLS: usize = 8192;
 const MOST_GRID_CELLS: u64 = 1 << 19;
-/// Edge of the cells that others fall back on, in cells.
-const COARSE: u32 = 4;
+/// Most times that a cell far from the camera's paths is wider than one where they go.
+const MOST_COARSE: u32 = 16;
 /// Most shadow rays of all cells together, and of these for each cluster.
 const MOST_RAYS: usize = 1 << 21;
 const RAYS_PER_CLUSTER: usize = 1 << 13;
@@ -131,15 +137,34 @@ impl Grid {
         for step in 4..32 {
             let finer = with(0.5 * (0.5 * step as f32).exp2());
             let cells: u64 = finer.size.iter().map(|&count| u64::from(count)).product();
-            let mut held: Vec<usize> = places.iter().map(|place| finer.index(place)).collect();
-            held.sort_unstable();
-            held.dedup();
-            if cells > MOST_GRID_CELLS || held.len() > most {
+            if cells > MOST_GRID_CELLS || finer.held(places) > most {
                 break;
             }
             grid = finer;
         }
         grid
+    }
+
+    /// Returns this grid with cells divided into as many as `places` allow, of which at most `most` hold any,
+    /// and their number along each edge.
+    fn divided(&self, places: &[Place], most: usize) -> (Self, u32) {
+        let with = |times: u32| Self {
+            cells_per_metre: times as f32 * self.cells_per_metre,
+            size: self.size.map(|count| times * count),
+            ..*self
+        };
+        let fits = |times: &u32| {
+            let finer = with(*times);
+            let cells: u64 = finer.size.iter().map(|&count| u64::from(count)).product();
+            cells <= MOST_GRID_CELLS && finer.held(places) <= most
+        };
+        let times = (2..=MOST_COARSE).take_while(fits).last().unwrap_or(1);
+        (with(times), times)
+    }
+
+    /// Number of cells and faces that hold any of `places`.
+    fn held(&self, places: &[Place]) -> usize {
+        places.iter().map(|place| self.index(place)).collect::<BTreeSet<_>>().len()
     }
 
     fn cell(&self, position: Vec3) -> UVec3 {
@@ -197,17 +222,21 @@ impl LampCells {
             radius: radius(scene.geometry.extent()),
             offset: accel.ray_offset(),
         };
-        let places: Vec<Place> =
-            (0..WALKS).into_par_iter().flat_map_iter(|walk| survey.walk(walk)).collect();
-        let grid = Grid::over(
-            &places,
-            (MOST_RAYS.min(RAYS_PER_CLUSTER * clusters.len()) / rays).min(MOST_CELLS),
-        );
+        let walked = |camera| -> Vec<Place> {
+            (0..WALKS).into_par_iter().flat_map_iter(|walk| survey.walk(walk, camera)).collect()
+        };
+        let (near, mut places) = (walked(Some(&scene.camera)), walked(None));
+        places.extend(&near);
+        let most = (MOST_RAYS.min(RAYS_PER_CLUSTER * clusters.len()) / rays).min(MOST_CELLS);
+        // Half of the cells are where the camera's paths go; the others cover all surfaces.
+        let (grid, times) = Grid::over(&places, most / 2).divided(&near, most / 2);
+        let coarse_index = |cell: UVec3, face| grid.index_of(cell / times * times, face);
         let mut fine: BTreeMap<usize, Vec<Place>> = BTreeMap::new();
         let mut coarse: BTreeMap<usize, Vec<Place>> = BTreeMap::new();
-        let coarse_index = |cell: UVec3, face| grid.index_of(cell / COARSE * COARSE, face);
-        for place in &places {
+        for place in &near {
             fine.entry(grid.index(place)).or_default().push(*place);
+        }
+        for place in &places {
             let index = coarse_index(grid.cell(place.position), cube_face(place.normal));
             coarse.entry(index).or_default().push(*place);
         }
@@ -216,7 +245,7 @@ impl LampCells {
         let sets: Vec<(&Vec<Place>, f32)> = fine
             .values()
             .map(|places| (places, edge))
-            .chain(coarse.values().map(|places| (places, COARSE as f32 * edge)))
+            .chain(coarse.values().map(|places| (places, times as f32 * edge)))
             .collect();
         let lists: Vec<Vec<LampEntry>> = (0_u32..)
             .zip(&sets)
@@ -261,8 +290,9 @@ struct Survey<'a> {
 }
 
 impl Survey<'_> {
-    /// Follows light from a lamp, every second time from a triangle, over diffuse surfaces.
-    fn walk(&self, walk: u32) -> Vec<Place> {
+    /// Follows paths from the camera, or light from a lamp, every second time from a triangle, over diffuse
+    /// surfaces.
+    fn walk(&self, walk: u32, camera: Option<&Camera>) -> Vec<Place> {
         let mut places = Vec::new();
         let [a, b, c, d] = hash_4d([walk, 0, 0, SEED]);
         let sides = [1.0, -1.0][(d & 1) as usize];
@@ -273,7 +303,12 @@ impl Survey<'_> {
         } else {
             Some(choice.source).filter(|source| source & LAMP_BIT == 0)
         };
-        let (mut origin, mut direction) = if let Some(triangle) = triangle {
+        let (mut origin, mut direction) = if let Some(camera) = camera {
+            let [right, up, forward] = camera.axes();
+            let half = VIEW * (0.5 * camera.vertical_fov_deg).to_radians().tan();
+            let [x, y] = [c, d].map(|bits| half * (2.0 * unit_float(bits) - 1.0));
+            (camera.position, (forward + x * right + y * up).normalize())
+        } else if let Some(triangle) = triangle {
             let position = self.point_on(triangle, [c, d.rotate_left(16)]);
             let normal = sides * self.normal(triangle, NO_INSTANCE);
             places.push(Place { position, normal });

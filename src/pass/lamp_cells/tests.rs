@@ -128,3 +128,35 @@ fn every_cell_and_face_has_its_own_index() {
         assert_eq!(cube_face(normal.into()), face, "{normal:?}");
     }
 }
+
+/// A floor with a row of lamps above it; the camera looks down on one end.
+#[test]
+fn cells_are_finer_where_the_camera_looks() {
+    let lamps: String = (0..40)
+        .map(|x| {
+            format!("[[lamp]]\ntype = \"point\"\nposition = [{x}, 2, 0]\nintensity = [3, 3, 3]\n")
+        })
+        .collect();
+    for (at, other) in [(1.0, 39.0), (39.0, 1.0)] {
+        let text = format!(
+            "[camera]\nposition = [{at}, 2, 0]\nlook_at = [{at}, 0, 0]\nup = [0, 0, 1]\n\
+             vertical_fov_deg = 20\n[[material]]\nname = \"floor\"\ntype = \"diffuse\"\n\
+             reflectance = [0, 0, 0]\n[[object]]\nshape = \"box\"\nsize = [40, 1, 2]\n\
+             material = \"floor\"\ntranslate = [20, -0.5, 0]\n{lamps}"
+        );
+        let scene = Scene::parse(Path::new("a.toml"), &text).unwrap();
+        let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
+        let tables = LampTables::new(&scene, &accel, &LightGroups::new(&scene));
+        let cells = LampCells::new(&scene, &accel, &tables);
+        // Lists along a metre of the floor.
+        let lists_at = |middle: f32| {
+            let list = |step: i32| {
+                let position = Vec3::new(middle + 0.01 * step as f32, 0.0, 0.0);
+                cells.lists[cells.grid.index(&Place { position, normal: Vec3::Y })]
+            };
+            (-50..50).map(list).collect::<BTreeSet<_>>().len()
+        };
+        let (near, far) = (lists_at(at), lists_at(other));
+        assert!(near > 2 * far, "{near} lists at {at} m, {far} at {other} m");
+    }
+}
