@@ -18,7 +18,7 @@ use fenestra_scene::{
     },
     texture::{Encoding, Interpolation, Wrap},
 };
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 
 use crate::support::folder::{BALL, Folder, yard};
 
@@ -644,10 +644,12 @@ fn heights_become_normals_along_their_image() {
     let normals = format!("<bsdf type=\"normalmap\">{}{diffuse}</bsdf>", image("normalmap"));
     let both = of(bumps(&image("any"), &normals));
     assert!(both.warnings.iter().any(|warning| warning.contains("`bumpmap`")), "{both:?}");
-    let flat = "<texture type=\"checkerboard\"><float name=\"color0\" value=\"0\"/></texture>";
-    let scene = of(bumps(flat, diffuse));
-    let flat = scene.materials[0].surface.normal.as_ref().unwrap().value(Vec2::splat(0.3));
-    assert!(flat.abs_diff_eq(Vec4::new(0.5, 0.5, 1.0, 1.0), 1e-3), "{flat}");
+    // Steps have no slope.
+    let steps = "<string name=\"filter_type\" value=\"nearest\"/></texture>";
+    for flat in ["<texture type=\"checkerboard\"/>", &image("any").replace("</texture>", steps)] {
+        let scene = of(bumps(flat, diffuse));
+        assert!(scene.materials[0].surface.normal.is_none() && scene.warnings.is_empty());
+    }
 }
 
 /// An image of 2 × 2 texels: red and green above blue and white.
@@ -1433,6 +1435,29 @@ fn images_that_cannot_be_read_leave_the_rest() {
     let [unreadable, absent] = &scene.warnings[..] else { panic!("{:#?}", scene.warnings) };
     assert!(unreadable.contains("a.xml: expected a PNG, JPEG"), "{unreadable}");
     assert!(absent.contains("that are not there (3, first in `../a.png`, line 5)"), "{absent}");
+}
+
+/// Mitsuba 3.9.1 reads the first colour, 0.4, where a colour is asked for, and the second for a number.
+#[test]
+fn checkerboards_of_numbers_are_the_other_way_round() {
+    let board = |name: &str| format!("<texture name=\"{name}\" type=\"checkerboard\"/>");
+    let surface = |bsdf: &str| material(bsdf).0.surface;
+    let mask = format!("<bsdf type=\"mask\">{}<bsdf type=\"diffuse\"/></bsdf>", board("opacity"));
+    let blend = format!(
+        "<bsdf type=\"blendbsdf\">{}<bsdf type=\"null\"/><bsdf type=\"diffuse\"/></bsdf>",
+        board("weight")
+    );
+    let principled = format!("<bsdf type=\"principled\">{}</bsdf>", board("roughness"));
+    let diffuse = format!("<bsdf type=\"diffuse\">{}</bsdf>", board("reflectance"));
+    for (used, expected) in [
+        (surface(&mask).opacity.texture, 0.2),
+        (surface(&blend).opacity.texture, 0.2),
+        (surface(&principled).roughness, 0.2),
+        (surface(&diffuse).color, 0.4),
+    ] {
+        let found = used.unwrap().value(Vec2::splat(0.25)).x;
+        assert!((found - expected).abs() < 1e-6, "{found}, expected {expected}");
+    }
 }
 
 #[test]

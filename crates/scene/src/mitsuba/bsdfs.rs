@@ -17,6 +17,7 @@ use crate::{
     import::{SOLID_IOR, Value, Width, blend::numbers, media},
     material::{ConductorFresnel, Distribution, Material, MaterialKind, Surface},
     math::colour::luminance,
+    texture::Interpolation,
 };
 
 /// Most models in one another; a model may name itself.
@@ -218,8 +219,9 @@ impl Reader {
         parameters.without_effect("flip_invalid_normals use_shadowing_function");
         for texture in parameters.objects("texture")? {
             match self.texture(texture, MAX_SCALES)? {
-                // One height everywhere bends nothing.
+                // One height everywhere bends nothing, nor do steps.
                 Value::Constant(_) => {}
+                Value::Image(heights) if heights.interpolation == Interpolation::Nearest => {}
                 Value::Image(heights) if model.surface.normal.is_none() => {
                     let heights = heights.affine(scale, Vec3::ZERO);
                     model.surface.normal = Some(self.reliefs.keep(heights));

@@ -1,6 +1,6 @@
 //! Textures and the colours that stand in their place.
 
-use std::sync::Arc;
+use std::{ops::Neg, sync::Arc};
 
 use glam::Vec3;
 
@@ -32,7 +32,16 @@ impl Reader {
         match node.tag() {
             "texture" => {
                 let value = self.texture(node, MAX_SCALES)?;
+                let is_number = role == Role::Index || ["opacity", "weight"].contains(&name);
+                let swaps = is_number && node.kind() == "checkerboard" && node.version() >= 2.0;
                 Ok(Some(match value {
+                    // Mitsuba since version 2 swaps the squares of a checkerboard that is read as numbers.
+                    Value::Image(mut board) if swaps => {
+                        board.bias =
+                            [0, 1, 2].map(|channel| board.bias[channel] + board.scale[channel]);
+                        board.scale = board.scale.map(f32::neg);
+                        Value::Image(board)
+                    }
                     Value::Constant(color) if role == Role::Reflectance => {
                         Value::Constant(color.min(Vec3::ONE))
                     }
