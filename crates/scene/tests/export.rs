@@ -443,6 +443,24 @@ fn sheets_come_back() {
     }
 }
 
+/// The base of Mitsuba's principled model has another mean below a dielectric, that of its metal the same.
+#[test]
+fn bases_come_back_from_mitsuba_whatever_their_share_of_metal() {
+    let folder = Folder::new();
+    for metallic in ["0", "0.25", "1"] {
+        let clay = format!(
+            "type = \"principled\"\nbase_color = [0.5, 0.25, 0.125]\nroughness = 0.9\n\
+             metallic = {metallic}"
+        );
+        let path = folder.path().join("a.xml");
+        mitsuba::export(&square(&folder, &clay), &path, SETTINGS).write().unwrap();
+        let read = Scene::load(&path).unwrap();
+        let MaterialKind::Principled(own) = read.materials[0].kind else { panic!() };
+        let base = Vec3::new(0.5, 0.25, 0.125);
+        assert!(own.base_color.abs_diff_eq(base, 2e-3), "{metallic}: {own:?}");
+    }
+}
+
 #[test]
 fn mirrors_and_coats_come_back_from_pbrt() {
     let folder = Folder::new();

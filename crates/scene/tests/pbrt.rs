@@ -131,22 +131,25 @@ fn fov_is_that_of_the_shorter_side_and_lenses_scale() {
     let [x, y] = scene.camera.shift.map(|heights| 2.0 * heights * half);
     assert!((half - 0.25).abs() < 1e-6 && (x - 0.4444444).abs() < 1e-6 && (y + 1.0).abs() < 1e-6);
     // Rays through the corners of a crop are those of the whole film.
-    for (crop, [left, right, top, bottom]) in [
-        (r#""float cropwindow" [0.5 1 0.25 0.5]"#, [640.0, 1280.0, 180.0, 360.0]),
-        (r#""integer pixelbounds" [100 400 -7 60]"#, [100.0, 400.0, 0.0, 60.0]),
+    let screen = "\"float screenwindow\" [-1.2777778 2.2777778 -0.75 1.25]";
+    for (crop, [left, right, top, bottom], window, [right_by, up_by]) in [
+        (r#""float cropwindow" [0.5 1 0.25 0.5]"#, [640.0, 1280.0, 180.0, 360.0], "", [0.0; 2]),
+        (r#""integer pixelbounds" [100 400 -7 60]"#, [100.0, 400.0, 0.0, 60.0], "", [0.0; 2]),
+        (r#""integer pixelbounds" [100 400 0 60]"#, [100.0, 400.0, 0.0, 60.0], screen, [0.5, 0.25]),
     ] {
-        let scene = load(&format!("Film \"rgb\" {crop} Camera \"perspective\""), "");
+        let scene = load(&format!("Film \"rgb\" {crop} Camera \"perspective\" {window}"), "");
         assert_eq!(warnings(&scene), [DARK]);
         let (width, height) = (scene.film.width as f32, scene.film.height as f32);
         assert_eq!([width, height], [right - left, bottom - top]);
         let tall = 2.0 * (0.5 * scene.camera.vertical_fov_deg).to_radians().tan();
         let [x, y] = scene.camera.shift;
         for (side, found) in [(-0.5, left), (0.5, right)] {
-            let expected = (found - 640.0) / 360.0;
+            let expected = (found - 640.0) / 360.0 + right_by;
             assert!((tall * (x + side * width / height) - expected).abs() < 1e-5, "{crop}");
         }
         for (side, found) in [(0.5, top), (-0.5, bottom)] {
-            assert!((tall * (y + side) - (360.0 - found) / 360.0).abs() < 1e-5, "{crop}");
+            let expected = (360.0 - found) / 360.0 + up_by;
+            assert!((tall * (y + side) - expected).abs() < 1e-5, "{crop}");
         }
     }
     let folder = Folder::new();
@@ -610,6 +613,8 @@ fn mixtures_and_surfaces_that_are_not_there() {
 fn image(folder: &Folder) {
     let bytes = [255, 0, 0, 255, 0, 0, 255, 128];
     image::save_buffer(folder.path().join("a.png"), &bytes, 2, 1, image::ColorType::Rgba8).unwrap();
+    let bytes = [255, 0, 0, 0, 255, 255];
+    image::save_buffer(folder.path().join("b.png"), &bytes, 2, 1, image::ColorType::Rgb8).unwrap();
 }
 
 fn textured(textures: &str, rest: &str) -> Scene {
@@ -650,9 +655,10 @@ fn images_are_scaled_inverted_mixed_and_placed() {
     );
     assert_eq!((mixed.scale, mixed.bias), ([0.25; 3], [0.75, 0.0, 0.375]));
     let board = color(
-        r#"Texture "t" "spectrum" "checkerboard" "rgb tex1" [1 0 0] "rgb tex2" [0 1 0] "float uscale" 8"#,
+        r#"Texture "t" "spectrum" "checkerboard" "rgb tex1" [1 0 0] "rgb tex2" [0 1 0]
+        "float uscale" 8 "float vscale" 6 "float udelta" 1 "float vdelta" 0.5"#,
     );
-    assert_eq!(board.image_from_uv, [[4.0, 0.0, 0.0], [0.0, 0.5, 0.0]]);
+    assert_eq!(board.image_from_uv, [[4.0, 0.0, 0.5], [0.0, 3.0, 0.25]]);
     let Texels::Halves(texels) = &board.texture.texels else { panic!() };
     assert_eq!(texels[0], texels[3]);
     assert_eq!(texels[0].map(half::f16::to_f32), [1.0, 0.0, 0.0, 1.0]);
@@ -663,11 +669,12 @@ fn images_are_scaled_inverted_mixed_and_placed() {
 fn images_are_multiplied_and_mixed_texel_by_texel() {
     let head = r#"Texture "a" "spectrum" "imagemap" "string filename" "a.png"
         Texture "f" "float" "imagemap" "string filename" "a.png"
+        Texture "g" "float" "imagemap" "string filename" "b.png"
         Texture "turned" "spectrum" "imagemap" "string filename" "a.png" "float uscale" -1"#;
-    let means = "ignored `scale` and `mix` of images on other coordinates than the first (line 4): \
+    let means = "ignored `scale` and `mix` of images on other coordinates than the first (line 5): \
                  their means count";
     // Red is opaque; blue is opaque by half.
-    let half = 128.0 / 255.0;
+    let (half, third) = (128.0 / 255.0, 1.0 / 3.0);
     for (texture, expected, lost) in [
         (
             r#""scale" "texture tex" "a" "texture scale" "f""#,
@@ -677,6 +684,17 @@ fn images_are_multiplied_and_mixed_texel_by_texel() {
         (
             r#""mix" "rgb tex1" [0 1 0] "texture tex2" "a" "texture amount" "f""#,
             [[1.0, 0.0, 0.0], [0.0, 1.0 - half, half]],
+            None,
+        ),
+        // The number of a colour is its mean.
+        (
+            r#""scale" "texture tex" "a" "texture scale" "g""#,
+            [[third, 0.0, 0.0], [0.0, 0.0, 2.0 * third]],
+            None,
+        ),
+        (
+            r#""mix" "rgb tex1" [0 1 0] "texture tex2" "a" "texture amount" "g""#,
+            [[third, 2.0 * third, 0.0], [0.0, third, 2.0 * third]],
             None,
         ),
         (
@@ -836,12 +854,16 @@ fn lights_of_one_material_keep_their_sides() {
 fn lamps_with_images_have_their_means() {
     let folder = Folder::new();
     image(&folder);
+    let tall = folder.path().join("tall.png");
+    image::save_buffer(tall, &[255; 6], 1, 2, image::ColorType::Rgb8).unwrap();
     let text = format!(
         r#"{MIRRORED} WorldBegin
         LightSource "goniometric" "string filename" "a.png" "rgb I" [3 6 9]
         LightSource "goniometric" "string filename" "a.png" "float power" 12.566371
         Rotate 90 0 1 0 LightSource "projection" "string filename" "a.png" "float fov" 90
-        LightSource "projection" "string filename" "a.png" "float fov" 90 "float power" 1"#
+        LightSource "projection" "string filename" "a.png" "float fov" 90 "float power" 1
+        LightSource "projection" "string filename" "tall.png" "float fov" 90
+        AreaLightSource "diffuse" "string filename" "a.png" "float power" 3 Shape "disk""#
     );
     let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
     let intensity = |lamp: usize| match scene.lamps[lamp].kind {
@@ -862,8 +884,16 @@ fn lamps_with_images_have_their_means() {
         .sum();
     let cone = 2.0 * PI * (1.0 - spot.outer_angle_rad.cos());
     assert!((cone / solid_angle - 1.0).abs() < 2e-3, "{cone} {solid_angle}");
-    let power = solid_angle * (0.2126 * intensity(3).x + 0.0722 * intensity(3).z);
+    let luminance = |color: Vec3| color.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+    let power = solid_angle * luminance(intensity(3));
     assert!((power - 1.0).abs() < 2e-3, "{power}");
+    let LampKind::Spot(tall) = scene.lamps[4].kind else { panic!() };
+    assert!((tall.outer_angle_rad / spot.outer_angle_rad - 1.0).abs() < 1e-5, "{tall:?}");
+    // The disk has the area π.
+    let emission = scene.materials[0].surface.emission.as_ref().unwrap();
+    let mean = Vec3::from(emission.texture.as_ref().unwrap().mean());
+    let power = PI.powi(2) * luminance(emission.radiance * mean);
+    assert!((power - 3.0).abs() < 0.01, "{power}");
     let found = warnings(&scene);
     assert!(
         found[0].contains("image of LightSource `goniometric` (2, first in line 2)"),
