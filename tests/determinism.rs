@@ -187,7 +187,7 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
             assert!(difference(&next, edge) > 1e-4 && difference(&half, edge) > 1e-4);
         }
         stopped.write_checkpoint(&path, sums).unwrap().unwrap();
-        let mut resumed = Session::new(support::device(), &scene, settings).unwrap();
+        let mut resumed = Session::new(support::device(), &scene, settings.clone()).unwrap();
         resumed.resume(&path).unwrap();
         assert_eq!(resumed.seconds(), stopped.seconds());
         assert_eq!(resumed.renderer.ahead(), stopped.renderer.ahead());
@@ -195,7 +195,11 @@ fn a_sweep_that_was_stopped_goes_on_to_the_bit() {
         resumed.renderer.set_watch(Box::new(|wave| wave.is_training == 0));
         resumed.renderer.render_pass(1).unwrap();
         assert!(resumed.renderer.ahead().blocks > stopped.renderer.ahead().blocks);
-        for Session { renderer, .. } in [&mut resumed, &mut stopped] {
+        let sums = resumed.renderer.sums().unwrap();
+        resumed.write_checkpoint(&path, sums).unwrap().unwrap();
+        let mut again = Session::new(support::device(), &scene, settings).unwrap();
+        again.resume(&path).unwrap();
+        for Session { renderer, .. } in [&mut resumed, &mut stopped, &mut again] {
             renderer.set_watch(Box::new(|_| false));
             renderer.render_pass(3).unwrap();
             assert!(renderer.sums().unwrap() == whole, "{} differs", sampler.name());
@@ -351,6 +355,10 @@ fn a_resumed_run_tells_how_far_it_is() {
     let by_samples = left(Rules { samples: Some(3), ..Rules::default() });
     let by_time = left(Rules { seconds: Some(3.0 * third.seconds()), ..Rules::default() });
     assert!((by_samples / by_time - 1.0).abs() < 1e-9, "{by_samples} s or {by_time} s");
+    // Another film has no rate as yet.
+    third.restart(1).unwrap();
+    let rules = Rules { samples: Some(3), ..Rules::default() };
+    assert_eq!(third.standing(&rules).seconds_left, None);
 }
 
 /// In a room with lamps, panes, mirrors and sheets, and with roulette, so that paths end for every reason.
