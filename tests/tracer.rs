@@ -123,15 +123,18 @@ fn picture(scene: &Scene, tracer: Tracer) -> Option<Vec<[f32; 3]>> {
 }
 
 /// Cut-out leaves, panes, solid glass and textures: the same chances at surfaces that let light pass. Before
-/// them, a pane with holes that fills the picture; after them, rough glass by a lamp.
+/// them, a pane with holes, by its vertices too, that fills the picture; after them, rough glass by a lamp
+/// and a sphere of panes that stop all of the green.
 #[test]
 fn host_and_device_draw_the_same_picture() {
     let kind = MaterialKind::pane(1.5, Vec3::ONE);
     let rough = MaterialKind::glass(1.5, 0.3);
     let mut pane = Material::new("pane", kind);
-    pane.surface.opacity.factor = 0.6;
+    pane.surface.opacity.factor = 0.8;
+    pane.surface.vertex_color = true;
     let mut holes = scenes::plane(Vec3::ONE, scenes::sky());
     holes.materials = vec![pane];
+    holes.geometry.colors = vec![[1.0, 1.0, 1.0, 0.75]; holes.geometry.positions.len()];
     assert_same_pictures(&holes);
     let mut scene = shipped("reading_room");
     (scene.film.width, scene.film.height) = (64, 48);
@@ -142,7 +145,9 @@ fn host_and_device_draw_the_same_picture() {
     let tinted = panes.map(|material| material.surface.color = color.clone()).count();
     assert!(tinted > 0 && color.is_some());
     assert_same_pictures(&scene);
-    let mut glass = scenes::room(vec![scenes::diffuse(Vec3::ONE), Material::new("glass", rough)]);
+    let magenta = Material::new("magenta", MaterialKind::pane(1.5, Vec3::new(0.9, 0.0, 0.9)));
+    let rough = Material::new("glass", rough);
+    let mut glass = scenes::room(vec![scenes::diffuse(Vec3::ONE), rough, magenta]);
     scenes::add_point(&mut glass, Vec3::new(0.5, 1.5, 0.5), Vec3::ONE);
     assert_same_pictures(&glass);
 }
