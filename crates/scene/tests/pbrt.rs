@@ -721,6 +721,23 @@ fn images_are_multiplied_and_mixed_texel_by_texel() {
 }
 
 #[test]
+fn the_number_of_a_coloured_image_scales_all_channels_alike() {
+    let folder = Folder::new();
+    let bytes = [255, 0, 0, 255, 255, 0];
+    image::save_buffer(folder.path().join("a.png"), &bytes, 2, 1, image::ColorType::Rgb8).unwrap();
+    let text = format!(
+        r#"{MIRRORED} WorldBegin Texture "f" "float" "imagemap" "string filename" "a.png"
+        Texture "t" "spectrum" "scale" "rgb tex" [0.3 0.6 0.9] "texture scale" "f"
+        Material "diffuse" "texture reflectance" "t" {TRIANGLE}"#
+    );
+    let scene = Scene::load(&folder.write("room.pbrt", text)).unwrap();
+    let values = scene.materials[0].surface.color.as_ref().unwrap().values();
+    for (found, expected) in values.iter().zip([[0.1, 0.2, 0.3], [0.2, 0.4, 0.6]]) {
+        assert!(Vec3::from_slice(found).abs_diff_eq(expected.into(), 1e-3), "{values:?}");
+    }
+}
+
+#[test]
 fn an_image_is_decoded_as_each_texture_says() {
     let folder = Folder::new();
     let grey = folder.path().join("a.png");

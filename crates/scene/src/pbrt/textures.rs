@@ -104,9 +104,7 @@ impl<'a> Textures<'a> {
                 let texture = of(self, "tex", 1.0)?;
                 let scale = self.value(entity, "scale", true)?;
                 Ok(match (texture, scale.unwrap_or(Value::number(1.0))) {
-                    (Value::Constant(factor), other) | (other, Value::Constant(factor)) => {
-                        other.affine(factor, Vec3::ZERO)
-                    }
+                    (texture, Value::Constant(factor)) => texture.affine(factor, Vec3::ZERO),
                     (texture, scale) => {
                         self.combined(entity, [texture, scale], |[texture, scale]| {
                             texture * mean(scale)
