@@ -135,8 +135,8 @@ features! {
     PBRT_TEXTURE_MIX "`scale` and `mix` of images on other coordinates than the first" "their means count";
     PBRT_TEXTURE_WRAP "`wrap` other than `repeat` and `clamp`" "as `clamp`";
     PBRT_TEXTURE_MAPPING "`mapping` of textures other than `uv`" "as `uv`";
-    PBRT_LIGHT_IMAGE "image of `goniometric` and `projection`"
-        "its mean from a point, or over a cone as wide";
+    PBRT_LIGHT_IMAGE "image of `goniometric` and `projection`, stretch of spots"
+        "its mean from a point, or over a cone as wide; round cones";
     PBRT_PORTAL "`portal` of lights" "they hide nothing";
     PBRT_EMISSION_IMAGE "images of bilinear patches that emit" "their area light counts";
     PBRT_INSTANCE_LIGHT "area lights in objects" "dark, as in pbrt";

@@ -920,6 +920,19 @@ fn lamps_with_images_have_their_means() {
 }
 
 #[test]
+fn the_stretch_of_a_spot_is_named() {
+    for (placed, is_named) in [
+        ("Rotate 20 0 1 0 Scale 2 2 -2", false),
+        ("Rotate 20 0 1 0 Scale 1.3 0.7 1.1", true),
+        ("ConcatTransform [1 0 0 0 1 1 0 0 0 0 1 0 0 0 0 1]", true),
+    ] {
+        let found = warnings(&world(&format!("{placed} LightSource \"spot\" {TRIANGLE}")));
+        let names = |text: &String| text.contains("stretch of LightSource `spot`");
+        assert_eq!(found.iter().any(names), is_named, "{placed}: {found:?}");
+    }
+}
+
+#[test]
 fn square_maps_lie_where_pbrt_shows_them() {
     let folder = Folder::new();
     // Red where z of the light is above 0: inside the diamond.

@@ -127,6 +127,14 @@ impl Lights {
                 LampKind::Point { position: place(from), intensity }
             }
             "spot" => {
+                // A turn and one size for all axes keep a cone round.
+                let axes = DMat3::from_mat4(world_from_light);
+                let square = axes.transpose() * axes;
+                let size = square.x_axis.x;
+                if !square.abs_diff_eq(DMat3::from_diagonal(DVec3::splat(size)), 1e-3 * size) {
+                    let name = "stretch of LightSource `spot`";
+                    textures.log.ignore_named(features::PBRT_LIGHT_IMAGE, name, &entity.place);
+                }
                 let outer = entity.number("coneangle", 30.0)?.clamp(0.01, 180.0);
                 let inner = outer - entity.number("conedeltaangle", 5.0)?;
                 let [inner, outer] = [inner.clamp(0.0, outer), outer].map(f64::to_radians);
