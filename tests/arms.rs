@@ -126,8 +126,8 @@ fn no_arm_has_more_rays_than_asked_for() {
     // Bounces are guided where shadow rays are.
     let is_as_mis = |name: &&str| name.contains("later ones as mis");
     let are_guided = |name: &&str| name.contains("guided bounces");
-    assert!(first.iter().any(|name| are_guided(&name) && !is_as_mis(&name)), "{names:?}");
-    assert!(!names.iter().any(|name| are_guided(&name) && is_as_mis(&name)), "{names:?}");
+    assert!(first.iter().any(|name| are_guided(name) && !is_as_mis(name)), "{names:?}");
+    assert!(!names.iter().any(|name| are_guided(name) && is_as_mis(name)), "{names:?}");
     for (name, rays) in last.iter().zip(["5 + 1", "3 + 1", "8 + 2"]) {
         assert!(name.starts_with(&format!("guided, {rays} rays")), "{names:?}");
     }
