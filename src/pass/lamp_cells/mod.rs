@@ -133,16 +133,8 @@ impl Grid {
             let size = ((high - low) / edge).floor().as_uvec3() + UVec3::ONE;
             Self { origin: low, cells_per_metre: 1.0 / edge, size: size.into() }
         };
-        let mut grid = with(1.0);
-        for step in 4..32 {
-            let finer = with(0.5 * (0.5 * step as f32).exp2());
-            let cells: u64 = finer.size.iter().map(|&count| u64::from(count)).product();
-            if cells > MOST_GRID_CELLS || finer.held(places) > most {
-                break;
-            }
-            grid = finer;
-        }
-        grid
+        let finer = (4..32).map(|step| with(0.5 * (0.5 * step as f32).exp2()));
+        finer.take_while(|grid| grid.fits(places, most)).last().unwrap_or(with(1.0))
     }
 
     /// Returns this grid with cells divided into as many as `places` allow, of which at most `most` hold any,
@@ -153,18 +145,16 @@ impl Grid {
             size: self.size.map(|count| times * count),
             ..*self
         };
-        let fits = |times: &u32| {
-            let finer = with(*times);
-            let cells: u64 = finer.size.iter().map(|&count| u64::from(count)).product();
-            cells <= MOST_GRID_CELLS && finer.held(places) <= most
-        };
-        let times = (2..=MOST_COARSE).take_while(fits).last().unwrap_or(1);
+        let times = (2..=MOST_COARSE).take_while(|times| with(*times).fits(places, most)).last();
+        let times = times.unwrap_or(1);
         (with(times), times)
     }
 
-    /// Number of cells and faces that hold any of `places`.
-    fn held(&self, places: &[Place]) -> usize {
-        places.iter().map(|place| self.index(place)).collect::<BTreeSet<_>>().len()
+    /// True if the cells are not too many, and at most `most` cells and faces hold any of `places`.
+    fn fits(&self, places: &[Place], most: usize) -> bool {
+        let held = || places.iter().map(|place| self.index(place)).collect::<BTreeSet<_>>();
+        let cells: u64 = self.size.iter().map(|&count| u64::from(count)).product();
+        cells <= MOST_GRID_CELLS && held().len() <= most
     }
 
     fn cell(&self, position: Vec3) -> UVec3 {
