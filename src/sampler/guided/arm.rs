@@ -10,6 +10,7 @@ use crate::{
     gpu::Capabilities,
     pass::{PassSettings, Roulette, Steps},
     sampler::{Parameters, basic, rays::RaySteps},
+    shader::constants::SURFACES_TEXTURED,
 };
 
 /// Throughputs below which the paths of an arm may end.
@@ -58,6 +59,8 @@ pub(super) struct Work {
 /// not be the same in every run.
 pub(super) struct Prices {
     ray: f64,
+    /// Extra for its hit in a scene with textures.
+    texture: f64,
     shadow_ray: f64,
     /// Direction chosen as by `mis`.
     direction: f64,
@@ -68,19 +71,21 @@ pub(super) struct Prices {
     cohort: f64,
 }
 
-/// Microseconds of a core on lavapipe.
+/// Microseconds of a core on lavapipe with Embree in eight scenes.
 const SOFTWARE_PRICES: Prices = Prices {
-    ray: 2.0,
-    shadow_ray: 0.2,
-    direction: 0.4,
-    guided_candidates: [0.65, 0.28],
-    guided_bounce: 0.3,
-    cohort: 3.0,
+    ray: 0.35,
+    texture: 0.3,
+    shadow_ray: 0.22,
+    direction: 0.07,
+    guided_candidates: [0.12, 0.09],
+    guided_bounce: 0.2,
+    cohort: 0.65,
 };
 
 /// Nanoseconds of an H100 in five scenes: rays are dear, and choosing their directions is cheap.
 const GPU_PRICES: Prices = Prices {
     ray: 1.8,
+    texture: 0.0,
     shadow_ray: 0.56,
     direction: 0.11,
     guided_candidates: [0.13, 0.06],
@@ -148,7 +153,7 @@ pub(super) enum Axes {
 
 /// The arms of one render: settings that are given, and those that a measurement may decide.
 pub(super) struct Arms {
-    pub(super) prices: &'static Prices,
+    pub(super) prices: Prices,
     guided: GuidedSteps,
     mis: RaySteps,
     roulette: Roulette,
@@ -170,7 +175,10 @@ impl Arms {
         settings: &PassSettings,
         capabilities: &Capabilities,
     ) -> Result<Self> {
-        let is_software = capabilities.is_software();
+        let mut prices = if capabilities.is_software() { SOFTWARE_PRICES } else { GPU_PRICES };
+        if settings.surfaces.features & SURFACES_TEXTURED != 0 {
+            prices.ray += prices.texture;
+        }
         let own = parameters.guided;
         let candidates = first_candidates(parameters)?;
         let (most, has_paths) = (settings.shadow_rays, settings.depth > 1);
@@ -199,7 +207,7 @@ impl Arms {
         let has_own_bounces =
             own.bounce_candidates != GuidedParameters::default().bounce_candidates;
         Ok(Self {
-            prices: if is_software { &SOFTWARE_PRICES } else { &GPU_PRICES },
+            prices,
             guided: GuidedSteps::new(candidates, own, settings),
             mis: basic::MIS.steps(parameters, settings.surfaces)?,
             roulette: settings.roulette,
@@ -337,12 +345,12 @@ mod tests {
         let all = Arm { guides_bounces: true, guides_later: true, shares_paths: true, ..guided };
         // Three rays and five shadow rays a path: one vertex of four directions, two of two.
         let work = Work { paths: 10.0, rays: 30.0, shadow_rays: 50.0 };
-        let traced = 3.0 * 2.0 + 5.0 * 0.2;
-        let candidates = 0.65 + 2.0 * 0.28;
+        let traced = 3.0 * 0.35 + 5.0 * 0.22;
+        let candidates = 0.12 + 2.0 * 0.09;
         for (arm, expected) in [
-            (mis, traced + 8.0 * 0.4),
-            (guided, traced + 4.0 * candidates + 4.0 * 0.4),
-            (all, traced + 8.0 * candidates + 3.0 * 0.3 + 3.0),
+            (mis, traced + 8.0 * 0.07),
+            (guided, traced + 4.0 * candidates + 4.0 * 0.07),
+            (all, traced + 8.0 * candidates + 3.0 * 0.2 + 0.65),
         ] {
             let found = SOFTWARE_PRICES.time(&arm, work);
             assert!((found - expected).abs() < 1e-9, "{arm}: {found} instead of {expected}");
