@@ -109,31 +109,43 @@ fn the_arm_is_measured_and_told() {
     support::assert_silent();
 }
 
-/// Two races at once, in a film of this size at 256 samples per pixel: how paths go on, and by how many rays.
+/// Races after the first, in a film of this size at 256 samples per pixel: of how paths go on and by how many
+/// rays, and of the rays alone.
 #[test]
 fn no_arm_has_more_rays_than_asked_for() {
     let _alone = support::alone();
-    let mut later = renderer(&room(), guided(None));
-    let sums = Sums { sample_count: 256, ..later.sums().unwrap() };
-    let empty = later.guide_state().unwrap().unwrap();
-    let arm = Some(Arm { is_guided: true, rays: [5, 1], ..LEAN });
-    later.restore(&sums).unwrap();
-    later.restore_guide(&GuideState { samples: 256, arm, races: 1, ..empty }).unwrap();
-    later.render_pass(1).unwrap();
-    let found = costs(&later.report().figures);
-    let names: Vec<&str> = found.iter().map(|cost| cost.arm.as_str()).collect();
+    let raced = |arm: Arm, races| {
+        let mut later = renderer(&room(), guided(None));
+        let sums = Sums { sample_count: 256, ..later.sums().unwrap() };
+        let empty = later.guide_state().unwrap().unwrap();
+        later.restore(&sums).unwrap();
+        let state = GuideState { samples: 256, arm: Some(arm), races, ..empty };
+        later.restore_guide(&state).unwrap();
+        later.render_pass(1).unwrap();
+        // A new arm has random numbers of its own from here on.
+        let state = later.guide_state().unwrap().unwrap();
+        let since = if state.arm == Some(arm) { 0 } else { 256 };
+        assert_eq!((state.races, state.arm_since), (3, since));
+        let found = costs(&later.report().figures);
+        found.into_iter().map(|cost| cost.arm).collect::<Vec<_>>()
+    };
+    let names = raced(Arm { is_guided: true, rays: [5, 1], ..LEAN }, 1);
     let (first, last) = names.split_at(names.len() - 3);
     // Bounces are guided where shadow rays are.
-    let is_as_mis = |name: &&str| name.contains("later ones as mis");
-    let are_guided = |name: &&str| name.contains("guided bounces");
-    assert!(first.iter().any(|name| are_guided(name) && !is_as_mis(name)), "{names:?}");
-    assert!(!names.iter().any(|name| are_guided(name) && is_as_mis(name)), "{names:?}");
-    for (name, rays) in last.iter().zip(["5 + 1", "3 + 1", "8 + 2"]) {
-        assert!(name.starts_with(&format!("guided, {rays} rays")), "{names:?}");
-    }
-    // A new arm has random numbers of its own from here on.
-    let state = later.guide_state().unwrap().unwrap();
-    assert_eq!((state.races, state.arm_since), (3, if state.arm == arm { 0 } else { 256 }));
+    let is_as_mis = |name: &&String| name.contains("later ones as mis");
+    let are_guided = |name: &&String| name.contains("guided bounces");
+    assert!(first.iter().any(|name| are_guided(&name) && !is_as_mis(&name)), "{names:?}");
+    assert!(!names.iter().any(|name| are_guided(&name) && is_as_mis(&name)), "{names:?}");
+    let have_rays = |names: &[String], rays: &[&str]| {
+        let has =
+            |(name, rays): (&String, &&str)| name.starts_with(&format!("guided, {rays} rays"));
+        names.len() == rays.len() && names.iter().zip(rays).all(has)
+    };
+    assert!(have_rays(last, &["5 + 1", "3 + 1", "8 + 2"]), "{names:?}");
+    // All that are asked for are not doubled.
+    let all = Arm { is_guided: true, guides_later: true, rays: [8, 8], ..LEAN };
+    let names = raced(all, 2);
+    assert!(have_rays(&names, &["8 + 8", "4 + 4"]), "{names:?}");
     support::assert_silent();
 }
 
