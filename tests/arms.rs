@@ -2,7 +2,10 @@
 //! expectation.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests may panic")]
 
-use std::{collections::BTreeMap, fs};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+};
 
 use fenestra::{
     film::{Attribute, Statistics, Sums},
@@ -69,7 +72,7 @@ fn the_arm_is_measured_and_told() {
     let _alone = support::alone();
     let mut auto = renderer(&room(), guided(None));
     assert_eq!((auto.report().candidates, auto.report().choice), (None, None));
-    auto.render_pass(129).unwrap();
+    auto.render_pass(9).unwrap();
     let report = auto.report();
     let found = costs(&report.figures);
     eprintln!("{:?} of {found:#?}", report.choice);
@@ -78,25 +81,25 @@ fn the_arm_is_measured_and_told() {
     assert_eq!(report.figures["arm"], arm.to_string());
     assert!(report.choice.unwrap().contains(&arm.to_string()));
     assert_eq!(report.candidates, arm.is_guided.then_some(arm.candidates));
-    // The technique before the first sample, bounces and sharing as soon as so small a film can afford them.
-    assert_eq!((state.races, found[0].at_samples), (2, 0));
+    // Techniques race before the first sample, all else as soon as so small a film can afford it.
+    assert!(state.races == 1 && found.iter().all(|cost| cost.at_samples == 0), "{found:?}");
     let names: Vec<&str> = found.iter().map(|cost| cost.arm.as_str()).collect();
-    for name in ["guided, 8 + 2 rays, guided bounces, shared paths, roul", "mis, 2 + 1"] {
-        assert!(names.iter().any(|arm| arm.starts_with(name)), "{name} of {names:?}");
+    for (name, expected) in names.iter().zip([
+        "guided, 8 + 2 rays, guided bounces, shared paths, roulette below 0.1",
+        "mis, 2 + 1 rays, shared paths, roulette below 0.1",
+        "guided, 8 + 2 rays, shared paths, roulette below 0.1",
+        "guided, 4 + 1 rays, later ones as mis, shared paths, roulette below 0.1",
+    ]) {
+        assert_eq!(*name, expected);
     }
+    assert_eq!(names.len(), 4);
     assert!(found.iter().all(|cost| cost.ms_per_sample > 0.0 && cost.rounds > 0), "{found:?}");
-    for at_samples in [0, 128] {
-        let chosen = found.iter().filter(|cost| cost.at_samples == at_samples && cost.is_chosen);
-        assert_eq!(chosen.count(), 1);
-    }
-    let chosen = |at_samples: u32| {
-        let mut those = found.iter().filter(|cost| cost.at_samples == at_samples);
-        those.find(|cost| cost.is_chosen).unwrap()
-    };
-    // The sentence compares the last race's choice with the best of the others.
-    let others = found.iter().filter(|cost| cost.at_samples == 128 && !cost.is_chosen);
+    assert_eq!(found.iter().filter(|cost| cost.is_chosen).count(), 1);
+    let chosen = found.iter().find(|cost| cost.is_chosen).unwrap();
+    // The sentence compares the race's choice with the best of the others.
+    let others = found.iter().filter(|cost| !cost.is_chosen);
     let second = others.map(|cost| cost.relative_cost).reduce(f64::min).unwrap();
-    let told = format!("with {:.2} times", second / chosen(128).relative_cost);
+    let told = format!("with {:.2} times", second / chosen.relative_cost);
     assert!(auto.report().choice.unwrap().contains(&told), "{told}: {:?}", auto.report().choice);
     assert!(auto.host_ms()["choice of an arm"] > 0.0);
     // Measured rays teach nothing: the guide has learned of the last sample since, at two vertices.
@@ -104,48 +107,48 @@ fn the_arm_is_measured_and_told() {
     assert!((1..=2 * 64 * 48).contains(&taught), "{taught}");
     // No clock takes part.
     let mut again = renderer(&room(), guided(None));
-    again.render_pass(129).unwrap();
+    again.render_pass(9).unwrap();
     assert_same(&auto.sums().unwrap(), &again.sums().unwrap());
     support::assert_silent();
 }
 
-/// Races after the first, in a film of this size at 256 samples per pixel: of how paths go on and by how many
-/// rays, and of the rays alone.
+/// The second race, in a film of this size at 512 samples per pixel.
 #[test]
 fn no_arm_has_more_rays_than_asked_for() {
     let _alone = support::alone();
-    let raced = |arm: Arm, races| {
+    let raced = |arm: Arm| {
         let mut later = renderer(&room(), guided(None));
-        let sums = Sums { sample_count: 256, ..later.sums().unwrap() };
+        let sums = Sums { sample_count: 512, ..later.sums().unwrap() };
         let empty = later.guide_state().unwrap().unwrap();
         later.restore(&sums).unwrap();
-        let state = GuideState { samples: 256, arm: Some(arm), races, ..empty };
+        let state = GuideState { samples: 512, arm: Some(arm), races: 1, ..empty };
         later.restore_guide(&state).unwrap();
         later.render_pass(1).unwrap();
         // A new arm has random numbers of its own from here on.
         let state = later.guide_state().unwrap().unwrap();
-        let since = if state.arm == Some(arm) { 0 } else { 256 };
-        assert_eq!((state.races, state.arm_since), (3, since));
+        let since = if state.arm == Some(arm) { 0 } else { 512 };
+        assert_eq!((state.races, state.arm_since), (2, since));
         let found = costs(&later.report().figures);
-        found.into_iter().map(|cost| cost.arm).collect::<Vec<_>>()
+        assert!(found.iter().all(|cost| cost.at_samples == 512), "{found:?}");
+        found.into_iter().map(|cost| cost.arm).collect::<BTreeSet<_>>()
     };
-    let names = raced(Arm { is_guided: true, rays: [5, 1], ..LEAN }, 1);
-    let (first, last) = names.split_at(names.len() - 3);
+    let rays = |names: &BTreeSet<String>| {
+        let rays = names.iter().filter_map(|name| name.strip_prefix("guided, ")?.split_once(','));
+        rays.map(|(rays, _)| rays.to_owned()).collect::<Vec<_>>()
+    };
+    let names = raced(Arm { is_guided: true, rays: [5, 1], ..LEAN });
     // Bounces are guided where shadow rays are.
     let is_as_mis = |name: &&String| name.contains("later ones as mis");
     let are_guided = |name: &&String| name.contains("guided bounces");
-    assert!(first.iter().any(|name| are_guided(&name) && !is_as_mis(&name)), "{names:?}");
+    assert!(names.iter().any(|name| are_guided(&name) && !is_as_mis(&name)), "{names:?}");
     assert!(!names.iter().any(|name| are_guided(&name) && is_as_mis(&name)), "{names:?}");
-    let have_rays = |names: &[String], rays: &[&str]| {
-        let has =
-            |(name, rays): (&String, &&str)| name.starts_with(&format!("guided, {rays} rays"));
-        names.len() == rays.len() && names.iter().zip(rays).all(has)
-    };
-    assert!(have_rays(last, &["5 + 1", "3 + 1", "8 + 2"]), "{names:?}");
+    let mut expected = vec!["3 + 1 rays"];
+    expected.extend([["5 + 1 rays"; 5].as_slice(), &["8 + 2 rays"; 2]].concat());
+    assert_eq!(rays(&names), expected, "{names:?}");
     // All that are asked for are not doubled.
-    let all = Arm { is_guided: true, guides_later: true, rays: [8, 8], ..LEAN };
-    let names = raced(all, 2);
-    assert!(have_rays(&names, &["8 + 8", "4 + 4"]), "{names:?}");
+    let names = raced(Arm { is_guided: true, guides_later: true, rays: [8, 8], ..LEAN });
+    let expected = [["4 + 4 rays"; 2].as_slice(), &["8 + 8 rays"; 5]].concat();
+    assert_eq!(rays(&names), expected, "{names:?}");
     support::assert_silent();
 }
 

@@ -136,21 +136,6 @@ impl fmt::Display for Arm {
     }
 }
 
-/// Settings among which a race decides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Axes {
-    /// How directions are chosen.
-    Technique,
-    /// How paths go on after the first vertex.
-    Paths,
-    /// Half and twice as many shadow rays.
-    Rays,
-    /// Technique and paths at once.
-    Techniques,
-    /// Every arm that differs by one setting.
-    Everything,
-}
-
 /// The arms of one render: settings that are given, and those that a measurement may decide.
 pub(super) struct Arms {
     pub(super) prices: Prices,
@@ -186,6 +171,11 @@ impl Arms {
         let chooses_technique = parameters.candidates.is_none() && most > 0;
         let chooses_sharing = parameters.share_paths.is_none() && settings.cohort_edge > 1;
         let shares_paths = settings.cohort_edge > 1;
+        let has_own_bounces =
+            own.bounce_candidates != GuidedParameters::default().bounce_candidates;
+        let chooses_bounces = chooses_technique && guides_bounces && !has_own_bounces;
+        let chooses_rays =
+            chooses_technique && has_paths && own.later_rays.is_none() && own.open_rays.is_none();
         let first = Arm {
             is_guided: true,
             guides_bounces,
@@ -204,8 +194,6 @@ impl Arms {
             rays: own.rays_in_the_open(most, settings.depth),
             ..first
         };
-        let has_own_bounces =
-            own.bounce_candidates != GuidedParameters::default().bounce_candidates;
         Ok(Self {
             prices,
             guided: GuidedSteps::new(candidates, own, settings),
@@ -213,13 +201,10 @@ impl Arms {
             roulette: settings.roulette,
             first: [first, open],
             chooses_technique,
-            chooses_bounces: chooses_technique && guides_bounces && !has_own_bounces,
+            chooses_bounces,
             chooses_later: chooses_technique && has_paths && !(guides_bounces && has_own_bounces),
             chooses_sharing: chooses_sharing && most > 0,
-            chooses_rays: chooses_technique
-                && has_paths
-                && own.later_rays.is_none()
-                && own.open_rays.is_none(),
+            chooses_rays,
             chooses_roulette: chooses_technique
                 && has_paths
                 && settings.roulette == Roulette::default(),
@@ -277,47 +262,54 @@ impl Arms {
         taken
     }
 
-    /// Returns the arms that race along `axes`, `arm` first.
-    pub(super) fn contenders(&self, axes: Axes, arm: Arm, is_open: bool) -> Vec<Arm> {
-        let decides = |those: &[Axes]| axes == Axes::Everything || those.contains(&axes);
-        let by_paths = decides(&[Axes::Paths, Axes::Techniques]);
+    /// Returns the arms that race with `arm`, itself first: other techniques in the first race, all that
+    /// differ by one setting in others. Later vertices as by `mis` teach nothing, so rays are half as many.
+    pub(super) fn contenders(&self, is_first: bool, arm: Arm, is_open: bool) -> Vec<Arm> {
         let Arm { shares_paths, roulette_throughput, .. } = arm;
         let most = self.first(false).rays[0];
-        let with_rays = |rays: [u32; 2]| {
-            let is_free = decides(&[Axes::Rays]) && self.chooses_rays && rays != arm.rays;
-            (is_free, Arm { rays, ..arm })
-        };
-        let [low, high] = ROULETTE_THROUGHPUTS;
-        let other_throughput = if roulette_throughput == low { high } else { low };
-        let others = [
+        let half = arm.rays.map(|rays| rays.div_ceil(2));
+        let twice = arm.rays.map(|rays| (2 * rays).min(most));
+        let techniques = [
             (
-                decides(&[Axes::Technique, Axes::Techniques]) && self.chooses_technique && !is_open,
+                self.chooses_technique && !is_open,
                 Arm { shares_paths, roulette_throughput, ..self.first(arm.is_guided) },
             ),
             (
-                by_paths && self.chooses_bounces && arm.is_guided,
+                self.chooses_bounces && arm.is_guided,
                 Arm { guides_bounces: !arm.guides_bounces, guides_later: true, ..arm },
             ),
             (
-                by_paths && self.chooses_later && arm.is_guided,
-                Arm { guides_bounces: false, guides_later: !arm.guides_later, ..arm },
-            ),
-            (by_paths && self.chooses_sharing, Arm { shares_paths: !shares_paths, ..arm }),
-            with_rays(arm.rays.map(|rays| rays.div_ceil(2))),
-            with_rays(arm.rays.map(|rays| (2 * rays).min(most))),
-            (
-                decides(&[]) && self.chooses_roulette,
-                Arm { roulette_throughput: other_throughput, ..arm },
+                self.chooses_later && arm.is_guided,
+                Arm {
+                    guides_bounces: false,
+                    guides_later: !arm.guides_later,
+                    rays: match (self.chooses_rays, arm.guides_later) {
+                        (false, _) => arm.rays,
+                        (true, true) => half,
+                        (true, false) => twice,
+                    },
+                    ..arm
+                },
             ),
         ];
-        let others = others.into_iter().filter_map(|(is_free, other)| is_free.then_some(other));
+        let with_rays = |rays| (self.chooses_rays && rays != arm.rays, Arm { rays, ..arm });
+        let [low, high] = ROULETTE_THROUGHPUTS;
+        let other_throughput = if roulette_throughput == low { high } else { low };
+        let others = [
+            (self.chooses_sharing, Arm { shares_paths: !shares_paths, ..arm }),
+            with_rays(half),
+            with_rays(twice),
+            (self.chooses_roulette, Arm { roulette_throughput: other_throughput, ..arm }),
+        ];
         let place = GUIDED_CANDIDATES.iter().position(|count| *count == arm.candidates);
-        let place = place.filter(|_| decides(&[]) && self.chooses_technique && arm.is_guided);
-        let next_to =
-            |(index, _): &(usize, &u32)| place.is_some_and(|place| place.abs_diff(*index) == 1);
-        let candidates = GUIDED_CANDIDATES.iter().enumerate().filter(next_to);
-        let candidates = candidates.map(|(_, count)| Arm { candidates: *count, ..arm });
-        [arm].into_iter().chain(others).chain(candidates).collect()
+        let place = place.filter(|_| self.chooses_technique && arm.is_guided);
+        let candidates = GUIDED_CANDIDATES.iter().enumerate().map(|(index, count)| {
+            let is_next = place.is_some_and(|place| place.abs_diff(index) == 1);
+            (is_next, Arm { candidates: *count, ..arm })
+        });
+        let others = others.into_iter().chain(candidates).filter(|_| !is_first);
+        let free = techniques.into_iter().chain(others).filter(|(is_free, _)| *is_free);
+        [arm].into_iter().chain(free.map(|(_, other)| other)).collect()
     }
 }
 

@@ -8,7 +8,7 @@
 use std::time::Instant;
 
 use super::{
-    arm::{Arm, Arms, Axes, Work},
+    arm::{Arm, Arms, Work},
     buffers::{GuideBuffers, guide_schedule},
     cost::{ArmCost, MOST_ROUNDS, race},
     epoch::{TRAINING_SEED, with_epoch},
@@ -25,15 +25,11 @@ use crate::{
     },
 };
 
-/// Races of a render: the samples per pixel from which each is due, what it decides, and among how many arms.
-/// The last comes again whenever the film has four times as many samples.
-const RACES: [(u32, Axes, u64); 5] = [
-    (0, Axes::Technique, 2),
-    (2, Axes::Paths, 4),
-    (2, Axes::Rays, 3),
-    (16, Axes::Techniques, 5),
-    (64, Axes::Everything, 9),
-];
+/// Samples per pixel from which the second race is due; the first one comes before all samples. Another comes
+/// whenever the film has four times as many.
+const SECOND_RACE: u32 = 16;
+/// Most arms of a race.
+const MOST_ARMS: u32 = 9;
 /// Paths of the film for each that races after the first measure, if they take all rounds.
 const FILM_PATHS: u64 = 16;
 /// Separates the random numbers of measurements from those of the training and of the picture.
@@ -45,21 +41,16 @@ const LEAST_STRIDE: u32 = 8;
 /// Samples of each pixel in a wave, to see how they differ.
 const SAMPLES: u32 = 4;
 
-/// Returns the samples per pixel from which race number `race` is due in a film of `pixels` pixels, and what
-/// it decides. In small films the measured pixels are many, and races come later.
-pub(super) fn race_due(race: u32, pixels: u32) -> (u32, Axes) {
-    let last = RACES.len() - 1;
-    let (due, axes, arms) = RACES[last.min(race as usize)];
-    let again = (race as usize).saturating_sub(last) as u32;
-    let due = due.saturating_mul(4_u32.saturating_pow(again));
-    let before = RACES.iter().take(race as usize).skip(1).map(|(.., arms)| *arms).sum::<u64>();
-    let arms = if race == 0 { 0 } else { before + arms * u64::from(again.max(1)) };
-    let paths = u64::from(MOST_ROUNDS)
-        * arms
-        * u64::from(Blocks::over(pixels, 1).count * BLOCK_PIXELS * SAMPLES);
+/// Returns the samples per pixel from which race number `race` is due in a film of `pixels` pixels. In small
+/// films the measured pixels are many, and races come later.
+pub(super) fn race_due(race: u32, pixels: u32) -> u32 {
+    let Some(again) = race.checked_sub(1) else { return 0 };
+    let due = SECOND_RACE.saturating_mul(4_u32.saturating_pow(again));
+    let block_paths = u64::from(MOST_ROUNDS * MOST_ARMS * BLOCK_PIXELS * SAMPLES);
+    let paths = block_paths * u64::from(race) * u64::from(Blocks::over(pixels, 1).count);
     let affordable = (FILM_PATHS * paths).div_ceil(u64::from(pixels.max(1)));
     // Races need a guide that was just rebuilt.
-    (due.max(guide_schedule(affordable.min(1 << 30) as u32)), axes)
+    due.max(guide_schedule(affordable.min(1 << 30) as u32))
 }
 
 /// A race among the arms of a render.
@@ -272,10 +263,10 @@ mod tests {
 
     #[test]
     fn races_become_rare() {
-        let due = |pixels| (0..8).map(|race| race_due(race, pixels).0).collect::<Vec<u32>>();
-        assert_eq!(due(1 << 20), [0, 2, 2, 16, 64, 256, 1024, 4096]);
-        assert_eq!(race_due(40, 1 << 20).0, u32::MAX);
-        // An eighth of the pixels, four samples each, four arms, four rounds: a sixteenth of 128 samples.
-        assert_eq!(due(3072)[..3], [0, 128, 256]);
+        let due = |pixels| (0..6).map(|race| race_due(race, pixels)).collect::<Vec<u32>>();
+        assert_eq!(due(1 << 20), [0, 16, 64, 256, 1024, 4096]);
+        assert_eq!(race_due(40, 1 << 20), u32::MAX);
+        // An eighth of the pixels, four samples each, nine arms, four rounds: a sixteenth of 288 samples.
+        assert_eq!(due(3072)[..3], [0, 512, 1024]);
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::json;
 
 use super::{
-    arm::{Arm, Arms, Axes, first_candidates},
+    arm::{Arm, Arms, first_candidates},
     buffers::{GuideBuffers, GuideSize, SPLIT_AFTER, guide_schedule},
     cost::ArmCost,
     epoch::{TRAINING_SEED, with_arm, with_epoch},
@@ -168,10 +168,10 @@ impl Guided {
     fn choose(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
         let samples = progress.sample_count;
         let pixels = runner.film.padded_pixels();
-        while race_due(self.choice.races, pixels).0 <= samples {
-            let axes = race_due(self.choice.races, pixels).1;
+        while race_due(self.choice.races, pixels) <= samples {
+            let is_first = self.choice.races == 0;
             self.choice.races += 1;
-            let contenders = self.arms.contenders(axes, self.choice.arm, self.is_open);
+            let contenders = self.arms.contenders(is_first, self.choice.arm, self.is_open);
             if contenders.len() < 2 || !Race::fits(runner) {
                 continue;
             }
@@ -267,7 +267,7 @@ impl Passes for Guided {
 
     /// The arms of the first race; later ones warm up theirs.
     fn other_steps(&self) -> Vec<Box<dyn Steps>> {
-        let arms = self.arms.contenders(Axes::Technique, self.arms.first(false), false);
+        let arms = self.arms.contenders(true, self.arms.first(false), false);
         arms.iter().chain(&[self.arms.first(true)]).map(|arm| self.arms.steps(arm)).collect()
     }
 
@@ -299,7 +299,7 @@ impl Technique for Guided {
             self.choose(runner, progress)?;
         }
         let pixels = runner.film.padded_pixels();
-        let next = race_due(self.choice.races, pixels).0.max(samples + 1) - samples;
+        let next = race_due(self.choice.races, pixels).max(samples + 1) - samples;
         let is_guided = self.choice.arm.is_guided;
         Ok(if is_guided { next.min(guide_schedule(samples + 1) - samples) } else { next })
     }
