@@ -242,6 +242,14 @@ fn nothing_is_measured_where_there_is_nothing_to_choose() {
     let mut mis = renderer(&open, Settings { sampler: Sampler::Mis, ..direct });
     mis.render_pass(5).unwrap();
     assert_same(&auto.sums().unwrap(), &mis.sums().unwrap());
+    let mut lit = scenes::mixed_room();
+    lit.environment = scenes::environment(8, |_| Vec3::ZERO);
+    scenes::add_point(&mut lit, Vec3::new(0.1, 0.9, 0.1), Vec3::ONE);
+    let mut by_lamps = renderer(&lit, guided(None));
+    by_lamps.render_pass(2).unwrap();
+    let report = by_lamps.report();
+    assert!(by_lamps.guide_state().unwrap().unwrap().is_open && costs(&report.figures).is_empty());
+    assert_eq!(report.figures["arm"], "mis, 2 + 1 rays, shared paths, roulette below 0.1");
     let mut dark = renderer(&scenes::mixed_room(), Settings { shadow_rays: 0, ..guided(None) });
     dark.render_pass(2).unwrap();
     assert!(costs(&dark.report().figures).is_empty());

@@ -326,6 +326,12 @@ fn paths_end_at_light_that_is_not_sampled() {
         "camera trace texture emit sample_lamps shadow gather sample shadow gather features bounce \
          trace emit texture features gather deposit"
     );
+    let surfaces = Surfaces { has_black_environment: true, ..everything() };
+    assert_eq!(
+        listed(&PassSettings { surfaces, ..all }, wave(0, 1)),
+        "camera trace texture emit sample_lamps shadow gather features bounce trace emit texture \
+         features deposit"
+    );
     let training = Wave { is_training: 1, ..wave(0, 1) };
     assert_eq!(listed(&all, training), "camera trace texture sample shadow gather deposit");
     // The last ray gathers at a vertex of its own, without shadow rays.

@@ -273,11 +273,12 @@ impl<'a> Order<'a> {
     fn sample_environment(&mut self) {
         let PassSettings { surfaces, traversal, incoherent, .. } = *self.settings;
         let steps = self.steps;
-        if self.wave.total_shadow_rays > 0 {
+        let rays = if surfaces.has_black_environment { 0 } else { self.wave.total_shadow_rays };
+        if rays > 0 {
             self.add_all(steps.prepare(&self.wave));
         }
         loop {
-            let left = self.wave.total_shadow_rays - self.wave.first_shadow_ray;
+            let left = rays - self.wave.first_shadow_ray;
             self.wave.shadow_ray_count = left.min(steps.rays_per_group());
             if self.wave.shadow_ray_count > 0 {
                 self.add_all(steps.sample(&self.wave));
@@ -296,6 +297,9 @@ impl<'a> Order<'a> {
     }
 
     fn gather(&mut self, wave: Wave) {
+        if wave.to_lamps == 0 && self.settings.surfaces.has_black_environment {
+            return;
+        }
         let escape = self.steps.escape(wave.vertex).filter(|_| wave.to_lamps == 0);
         let escape = escape.unwrap_or_default();
         self.add_with(Kernel::new("gather", Domain::Arrivals, &escape), wave);

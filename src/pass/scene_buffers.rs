@@ -104,6 +104,7 @@ impl SceneBuffers {
                 | if geometry.traversal.is_instanced { SURFACES_INSTANCED } else { 0 }
                 | if lamp_cells.is_some() { SURFACES_LAMP_CELLS } else { 0 },
             lamp_count: lamps.source_count,
+            has_black_environment: scene.environment.is_black(),
             access: textures.access,
         };
         let materials = Buffer::from_slice(device, "materials", &tables.materials)?;

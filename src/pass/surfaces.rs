@@ -19,6 +19,8 @@ pub struct Surfaces {
     pub features: u32,
     /// Number of lamps and emitting triangles.
     pub lamp_count: u32,
+    /// True if they are all the light there is.
+    pub has_black_environment: bool,
     /// Access to textures and to attributes of triangles.
     pub access: TextureAccess,
 }

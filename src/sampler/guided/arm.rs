@@ -189,8 +189,9 @@ impl Arms {
             is_guided: false,
             guides_bounces: false,
             guides_later: false,
-            // Most paths leave an open scene before others can use them.
-            shares_paths: shares_paths && !chooses_sharing,
+            // Most paths leave an open scene before others can use them, but not one that lamps alone light.
+            shares_paths: shares_paths
+                && (!chooses_sharing || settings.surfaces.has_black_environment && most > 0),
             rays: own.rays_in_the_open(most, settings.depth),
             ..first
         };

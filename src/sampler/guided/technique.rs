@@ -192,8 +192,23 @@ impl Guided {
         self.buffers.rebuild(splits)
     }
 
-    /// Trains on sweeps over parts of the film and finds out whether the scene is open.
+    /// Renders as `mis` from here on: there is nothing to learn.
+    fn open(&mut self) {
+        self.is_open = true;
+        self.start_with(self.arms.first(true));
+        if let Some(choice) = self.open_choice.take() {
+            self.steps = self.arms.steps(&choice.arm);
+            self.choice = choice;
+        }
+    }
+
+    /// Trains on sweeps over parts of the film and finds out whether the scene is open. One that lamps alone
+    /// light is as good as open.
     fn train(&mut self, runner: &mut Runner, progress: &Progress) -> Result<()> {
+        if runner.settings.surfaces.has_black_environment {
+            self.open();
+            return Ok(());
+        }
         let pixels = runner.film.padded_pixels();
         let apart = pixels.div_ceil(MOST_TRAINING_PIXELS);
         let pixel_stride = TRAINING_SWEEPS * apart;
@@ -220,12 +235,7 @@ impl Guided {
             let traced = runner.totals.shadow_rays_traced - before.shadow_rays_traced;
             if sweep == 0 && visible as f64 > OPEN_SHARE * traced as f64 {
                 log::info!("{visible} of {traced} rays of the first sweep are visible: as mis");
-                self.is_open = true;
-                self.start_with(self.arms.first(true));
-                if let Some(choice) = self.open_choice.take() {
-                    self.steps = self.arms.steps(&choice.arm);
-                    self.choice = choice;
-                }
+                self.open();
                 return Ok(());
             }
             // Rebuild only after 1, 2, 4 and 8 sweeps: every rebuild costs time.
