@@ -14,7 +14,7 @@ use crate::error::Result;
 pub const GUIDED_CANDIDATES: [u32; 3] = [1, 4, 8];
 
 /// Most rounds of a race.
-pub const MOST_ROUNDS: u32 = 4;
+pub const MOST_ROUNDS: u32 = 6;
 const GROUPS: usize = 8;
 /// Share of the pixels that the trimmed figure leaves out. In seven scenes, ratios by four rounds had three
 /// quarters of the error of those that leave out a thousandth.
@@ -24,7 +24,7 @@ const CONFIDENCE: f64 = 2.0;
 /// Logarithm of a ratio that times may be wrong by.
 const ERROR_OF_TIMES: f64 = 0.1;
 /// Ratio of variance × time below which another arm replaces the one in use.
-const CLEAR_GAIN: f64 = 0.95;
+const CLEAR_GAIN: f64 = 0.9;
 /// Ratio of variance × time below which, by a standard error, two rounds are enough.
 const CLOSE: f64 = 1.1;
 /// Standard error of a logarithm where it is unknown. Finite, since files cannot hold infinities.

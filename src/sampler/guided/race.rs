@@ -266,7 +266,7 @@ mod tests {
         let due = |pixels| (0..6).map(|race| race_due(race, pixels)).collect::<Vec<u32>>();
         assert_eq!(due(1 << 20), [0, 16, 64, 256, 1024, 4096]);
         assert_eq!(race_due(40, 1 << 20), u32::MAX);
-        // An eighth of the pixels, four samples each, nine arms, four rounds: a sixteenth of 288 samples.
+        // An eighth of the pixels, four samples each, nine arms, six rounds: a sixteenth of 432 samples.
         assert_eq!(due(3072)[..3], [0, 512, 1024]);
     }
 }
