@@ -234,6 +234,22 @@ fn where_guided_learned_nothing_it_shows_its_rays() {
         .assert(0, &["the pixel sees the environment"]);
 }
 
+/// Rays to lamps are not the sampler's.
+#[test]
+fn a_black_environment_has_no_rays() {
+    let folder = scene(false);
+    let text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+    let lamp =
+        "[[lamp]]\ntype = \"point\"\nposition = [0.0, 3.0, 3.0]\nintensity = [9.0, 9.0, 9.0]\n";
+    let text = text.replace("[environment.sky]", "");
+    folder.write("scene.toml", text + lamp);
+    for sampler in ["mis", "product", "guided"] {
+        run(&folder, &["--sampler", sampler, "--shadow-rays", "5", "--pixel", "12,8"])
+            .assert(0, &[]);
+        assert_eq!(numbers(&folder)["rays"].as_array().unwrap().len(), 0, "{sampler}");
+    }
+}
+
 #[test]
 fn what_has_no_picture_says_so() {
     let folder = scene(false);

@@ -328,6 +328,7 @@ impl Runner {
     /// Shadow rays per hit in the last group at the first vertex, the one left in the wave buffers.
     pub(crate) fn last_group_rays(&self, steps: &dyn Steps) -> u32 {
         match steps.shadow_rays_at(0, self.settings.shadow_rays) {
+            _ if self.settings.surfaces.has_black_environment => 0,
             0 => 0,
             rays => (rays - 1) % steps.rays_per_group() + 1,
         }

@@ -165,11 +165,9 @@ impl Renderer {
                 lobes: Vec::new(),
                 cached: None,
             });
-            if most == 0 {
-                break;
-            }
-            let in_group = self.runner.last_group_rays(self.technique.steps()) - 1;
-            let last = (in_group * BLOCK_PIXELS) as usize;
+            let in_group = self.runner.last_group_rays(self.technique.steps());
+            let Some(last) = in_group.checked_sub(1) else { break };
+            let last = (last * BLOCK_PIXELS) as usize;
             let ray: ShadowRay = element(buffer(wave::SHADOW_RAYS), last)?;
             let visible: u32 = element(buffer(wave::VISIBILITY), last)?;
             pixel.rays.push(RayReadback {
