@@ -28,10 +28,8 @@ impl Folder {
         Self { allowed: allowed.map(|allowed| without_parents(&allowed)), ..self }
     }
 
-    /// Path of a file by its name. Slashes and backslashes separate folders.
-    ///
-    /// # Errors
-    /// A message for a name that is empty, absolute, or leaves the folder.
+    /// Path of a file by its name. Slashes and backslashes separate folders. Fails for a name that is empty,
+    /// absolute, or leaves the folder.
     pub(crate) fn file(&self, name: &str) -> Result<PathBuf, String> {
         self.file_within(Path::new(""), name)
     }

@@ -225,12 +225,8 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     })
 }
 
-/// Opens a regular file for reading, without waiting. Reading from a pipe or device could last for
-/// ever.
-///
-/// # Errors
-/// [`Error::Io`] for a folder and a file that cannot be read, [`Error::Format`] for a pipe, socket
-/// or device.
+/// Opens a regular file for reading, without waiting. Reading from a pipe or device could last for ever.
+/// Fails for a folder, a pipe, a socket, a device, and a file that cannot be read.
 pub(crate) fn open_regular(path: &Path) -> Result<File> {
     let io_error = |source| Error::io(path, "read", source);
     // Look before opening, which waits for the writer of a pipe.

@@ -109,10 +109,8 @@ impl DroppedOfMany {
     }
 }
 
-/// Checks that no position lies too far out for traversal.
-///
-/// # Errors
-/// A message that names the largest coordinate.
+/// Checks that no position lies too far out for traversal. Fails with a message that names the largest
+/// coordinate.
 pub(crate) fn check_extent(positions: impl IntoIterator<Item = Vec3>) -> Result<(), String> {
     let distances = positions.into_iter().map(|position| position.abs().max_element());
     let farthest = distances.fold(0.0, f32::max);
@@ -124,10 +122,8 @@ pub(crate) fn check_extent(positions: impl IntoIterator<Item = Vec3>) -> Result<
 }
 
 impl Geometry {
-    /// Counts vertices and triangles with as many further ones, which 32-bit indices must address.
-    ///
-    /// # Errors
-    /// A message with both numbers.
+    /// Counts vertices and triangles with as many further ones, which 32-bit indices must address. Fails with
+    /// a message of both numbers.
     pub(crate) fn counts(&self, vertices: usize, triangles: usize) -> Result<[usize; 2], String> {
         let (vertices, triangles) =
             (self.positions.len() + vertices, self.triangles.len() + triangles);

@@ -28,10 +28,8 @@ use pictures::ScenePictures;
 /// number of samples and of the time.
 const FEW_SAMPLERS: usize = 3;
 
-/// Writes `results.json`, `results.csv` and `index.html`.
-///
-/// # Errors
-/// A picture cannot be read, or a file cannot be written.
+/// Writes `results.json`, `results.csv` and `index.html`. Fails if a picture cannot be read, or a file cannot
+/// be written.
 pub fn write(report: &Report, folder: &Folder) -> Result<()> {
     report.write(folder)?;
     let is_by_samples = |rule: &&Rule| matches!(rule, Rule::Spp(_));

@@ -66,11 +66,9 @@ pub struct ScenePictures {
 const CROP_SIZE: f64 = 0.2;
 const CROP_COUNT: usize = 2;
 
-/// Reads the pictures of a scene: those shown are of the first seed, errors are root mean squares
-/// over all seeds. Also writes the error maps, with a legend, beside the pictures in the folder.
-///
-/// # Errors
-/// A picture cannot be read, or an error map cannot be written.
+/// Reads the pictures of a scene: those shown are of the first seed, errors are root mean squares over all
+/// seeds. Also writes the error maps, with a legend, beside the pictures in the folder. Fails if a picture
+/// cannot be read, or an error map cannot be written.
 pub fn load(
     folder: &Folder,
     report: &Report,

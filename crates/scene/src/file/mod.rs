@@ -265,10 +265,8 @@ pub(crate) struct PortalKeys {
 }
 
 impl SceneFile {
-    /// Parses the text of a scene file; `path` is for messages only.
-    ///
-    /// # Errors
-    /// [`crate::Error::Parse`] with line and column.
+    /// Parses the text of a scene file; `path` is for messages only. Fails with [`crate::Error::Parse`] with
+    /// line and column.
     pub(crate) fn parse(path: &Path, text: &str) -> Result<Self> {
         read::read_root(text).map_err(|failure| failure.locate(path, text))
     }

@@ -72,10 +72,8 @@ impl<'a> TensorFile<'a> {
         }
     }
 
-    /// Floats of a field and its shape.
-    ///
-    /// # Errors
-    /// A field that is missing, empty, not finite or of another type or count of dimensions.
+    /// Floats of a field and its shape. Fails for a field that is missing, empty, not finite or of another
+    /// type or count of dimensions.
     pub(super) fn floats<const DIMENSIONS: usize>(
         &self,
         name: &str,

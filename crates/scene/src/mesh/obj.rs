@@ -41,9 +41,7 @@ const LONGEST_CHAIN: usize = 16;
 /// Channels of a vertex without a colour, among others with; it becomes white.
 const NO_COLOR: f32 = f32::NAN;
 
-/// Reads an OBJ file and the material libraries beside it; a missing library is a warning.
-///
-/// # Errors
+/// Reads an OBJ file and the material libraries beside it; a missing library is a warning. Fails with
 /// [`Error::Io`], or [`Error::Parse`] with the line.
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     let (file, bytes) = files::open_unpacked(path)?;

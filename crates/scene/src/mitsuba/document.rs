@@ -121,28 +121,22 @@ impl<'a> Node<'a> {
         Error::parse(&self.document.files[*file], *line as usize, 1, message)
     }
 
-    /// Path of a file that the element names: in the scene's folder, or in one of its `path`s.
-    ///
-    /// # Errors
-    /// [`Error::Parse`] for a name that leaves the folder of the scene, or a file that is not there.
+    /// Path of a file that the element names: in the scene's folder, or in one of its `path`s. Fails for a
+    /// name that leaves the folder of the scene, or a file that is not there.
     pub(super) fn file(self, name: &str) -> Result<PathBuf> {
         self.document.resolve(name).flatten().map_err(|message| self.error(message))
     }
 
-    /// As [`Node::file`]; none inside for a file that is not there.
-    ///
-    /// # Errors
-    /// [`Error::Parse`] for a name that leaves the folder of the scene.
+    /// As [`Node::file`]; none inside for a file that is not there. Fails for a name that leaves the folder
+    /// of the scene.
     pub(super) fn file_if_there(self, name: &str) -> Result<Option<PathBuf>> {
         self.document.resolve(name).map(Result::ok).map_err(|message| self.error(message))
     }
 }
 
 impl Document {
-    /// Reads the scene file and all that it includes; names of files start in `folder`.
-    ///
-    /// # Errors
-    /// [`Error::Parse`] with the line, and errors of reading.
+    /// Reads the scene file and all that it includes; names of files start in `folder`. Fails with
+    /// [`Error::Parse`] with the line, or as reading does.
     pub(super) fn read(path: &Path, folder: Folder) -> Result<Self> {
         let mut builder = Builder {
             document: Self { folder, version: 3.0, ..Self::default() },
@@ -166,11 +160,8 @@ impl Document {
         names.filter_map(|node| self.resolve(node.attribute("value")?).ok()?.ok()).collect()
     }
 
-    /// Finds a file by its name, in another case if there is none in its own; inside is a message on one
-    /// that is not there.
-    ///
-    /// # Errors
-    /// A message on a name that no file may have.
+    /// Finds a file by its name, in another case if there is none in its own; inside is a message on one that
+    /// is not there. Fails for a name that no file may have.
     fn resolve(&self, name: &str) -> Result<Result<PathBuf, String>, String> {
         let own = [PathBuf::new()];
         let folders = own.iter().chain(&self.search);

@@ -223,10 +223,8 @@ const MEAN_TOLERANCE: f32 = 2e-3;
 /// Tilt of the vertical axis that counts as rounding of the file.
 const AXIS_TOLERANCE: f64 = 1e-4;
 
-/// Reads a map and turns it by the rotation of `matrix`; none if the matrix has no inverse.
-///
-/// # Errors
-/// Those of [`EnvironmentMap::load`].
+/// Reads a map and turns it by the rotation of `matrix`; none if the matrix has no inverse. Fails as
+/// [`EnvironmentMap::load`].
 fn load_map(
     path: &Path,
     scale: f32,

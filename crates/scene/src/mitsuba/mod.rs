@@ -73,11 +73,8 @@ struct Reader {
 }
 
 /// Reads a scene file, whose names of files start in `folder`; `camera` is the id or number of its sensor,
-/// which is else the first.
-///
-/// # Errors
-/// [`crate::Error::Parse`] with file and line for what cannot be read or rendered, and errors of the
-/// readers of meshes, images and maps.
+/// which is else the first. Fails with [`crate::Error::Parse`] with file and line for what cannot be read or
+/// rendered, or as the readers of meshes, images and maps.
 pub(crate) fn read(path: &Path, camera: Option<&str>, folder: Folder) -> Result<Imported> {
     let document = Document::read(path, folder)?;
     let mut reader = Reader { inputs: document.files.clone(), ..Reader::default() };

@@ -22,11 +22,8 @@ const DOUBLE_PRECISION: u32 = 0x2000;
 /// Longest name of a mesh.
 const MAX_NAME: usize = 4096;
 
-/// Reads mesh number `index`; its normals are empty if the file asks for flat ones.
-///
-/// # Errors
-/// [`Error::Io`], or [`Error::Format`] for a file that is truncated, of another format or without that
-/// mesh.
+/// Reads mesh number `index`; its normals are empty if the file asks for flat ones. Fails for a file that is
+/// truncated, of another format or without that mesh.
 pub(super) fn read(path: &Path, index: usize) -> Result<(Mesh, bool)> {
     let bytes = files::read(path)?;
     parse(&bytes, index).map_err(|message| Error::format(path, message))

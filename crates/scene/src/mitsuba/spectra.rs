@@ -68,10 +68,8 @@ pub(super) fn color(node: Node<'_>, role: Role) -> Result<Vec3> {
     Ok(color.max(Vec3::ZERO))
 }
 
-/// Colour of a reflectance, 0…1; that of a spectrum is clipped.
-///
-/// # Errors
-/// As [`color`], and for colours that are no spectrum and above 1.
+/// Colour of a reflectance, 0…1; that of a spectrum is clipped. Fails as [`color`], and for colours that are
+/// no spectrum and above 1.
 pub(super) fn reflectance(node: Node<'_>, ignored: &mut Ignored) -> Result<Vec3> {
     if node.tag() == "spectrum" {
         let color = color_of_kind(node, Role::Reflectance)?.as_dvec3();

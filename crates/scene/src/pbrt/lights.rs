@@ -217,10 +217,7 @@ impl Lights {
         Ok(())
     }
 
-    /// Sum of the infinite lights as one map.
-    ///
-    /// # Errors
-    /// A message for radiance that is not finite or negative.
+    /// Sum of the infinite lights as one map. Fails for radiance that is not finite or negative.
     pub(super) fn environment(&mut self) -> Result<EnvironmentMap, String> {
         // Resample the largest first, and the others to its size.
         let side = self.maps.iter().map(|(map, _)| map.width).max().unwrap_or(0);

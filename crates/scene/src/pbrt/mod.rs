@@ -63,11 +63,8 @@ pub(crate) fn is_pbrt(path: &Path) -> bool {
     }
 }
 
-/// Reads a scene description and the files that it names, in `folder`.
-///
-/// # Errors
-/// [`Error::Parse`] with file, line and column for everything that cannot be read or rendered,
-/// [`Error::Io`] for the main file.
+/// Reads a scene description and the files that it names, in `folder`. Fails with [`Error::Parse`] with file,
+/// line and column for everything that cannot be read or rendered, with [`Error::Io`] for the main file.
 pub(crate) fn read(path: &Path, folder: Folder) -> Result<Imported> {
     let (mut description, mut log) = Reader::read(path, folder)?;
     let asked = asked(&description, &mut log);

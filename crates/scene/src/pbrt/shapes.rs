@@ -308,10 +308,8 @@ fn face_normals(mesh: &mut Mesh) {
     }
 }
 
-/// Gives a mesh without texture coordinates those of pbrt: (0, 0), (1, 0) and (1, 1) on every triangle.
-///
-/// # Errors
-/// A message for more corners than indices can address.
+/// Gives a mesh without texture coordinates those of pbrt: (0, 0), (1, 0) and (1, 1) on every triangle. Fails
+/// for more corners than indices can address.
 pub(super) fn give_coordinates(mesh: &mut Mesh) -> Result<(), String> {
     if !mesh.uvs[0].is_empty() || mesh.triangles.is_empty() {
         return Ok(());

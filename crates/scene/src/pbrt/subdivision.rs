@@ -77,10 +77,8 @@ fn rings(positions: &[DVec3], edges: &HashMap<[u32; 2], Edge>) -> Vec<Ring> {
     rings
 }
 
-/// Subdivides a mesh, with normals from the triangles around each vertex of the result.
-///
-/// # Errors
-/// A message for levels that are out of range or make too many triangles.
+/// Subdivides a mesh, with normals from the triangles around each vertex of the result. Fails for levels that
+/// are out of range or make too many triangles.
 pub(super) fn subdivide(
     positions: &[[f32; 3]],
     mut triangles: Vec<[u32; 3]>,

@@ -73,11 +73,8 @@ impl<R: BufRead> Tokens<R> {
         Self { reader, line: 1, column: 1, bytes_left: most_bytes, buffer, text, place }
     }
 
-    /// Reads the next token; none at the end of the file.
-    ///
-    /// # Errors
-    /// [`Error::Io`], and [`Error::Parse`] for strings without an end, vast words and text that is
-    /// not UTF-8.
+    /// Reads the next token; none at the end of the file. Fails for strings without an end, vast words and
+    /// text that is not UTF-8.
     pub(super) fn next(&mut self) -> Result<Option<Token>> {
         self.buffer.clear();
         self.skip_blank()?;
@@ -251,10 +248,8 @@ pub(super) enum Part {
 }
 
 impl Source {
-    /// Opens the main file, whose names start in `folder`.
-    ///
-    /// # Errors
-    /// [`Io`](crate::error::Error::Io), and [`Format`](crate::error::Error::Format) for a device.
+    /// Opens the main file, whose names start in `folder`. Fails for a device, and for a file that cannot be
+    /// read.
     pub(super) fn open(path: &Path, folder: Folder) -> Result<Self> {
         let open = Open { tokens: open(path, MAX_BYTES)?, restores: false };
         Ok(Self { folder, open, outer: Vec::new(), held: None, inputs: vec![path.into()] })

@@ -74,10 +74,8 @@ fn default_count<const COUNT: usize>() -> usize {
 
 /// Parameters of a procedural shape.
 pub(crate) trait Shape: Debug {
-    /// Builds the closed mesh.
-    ///
-    /// # Errors
-    /// Returns a message that names the parameter, what is expected and what was found.
+    /// Builds the closed mesh. Fails with a message that names the parameter, what is expected and what was
+    /// found.
     fn mesh(&self) -> Result<Mesh, String>;
 }
 

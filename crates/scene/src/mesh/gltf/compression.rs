@@ -43,11 +43,7 @@ pub(super) fn is_fallback(buffer: &Value) -> bool {
 }
 
 /// Appends what the compressed parts of a document hold to its buffers, and returns the document that finds
-/// it there.
-///
-/// # Errors
-/// [`Error::Format`] for data that cannot be decoded or is not what the document says, and for want of
-/// memory.
+/// it there. Fails for data that cannot be decoded or is not what the document says, and for want of memory.
 pub(super) fn expand(
     path: &Path,
     document: Document,

@@ -232,10 +232,8 @@ pub(super) fn variant_names(json: &Value) -> Vec<String> {
     variants.into_iter().flatten().map(name).collect()
 }
 
-/// Gives primitives the materials of the variant `name`, and removes the choice from them.
-///
-/// # Errors
-/// A message that names the variants, for an unknown one.
+/// Gives primitives the materials of the variant `name`, and removes the choice from them. Fails for an
+/// unknown one, with a message that names the variants.
 fn choose_variant(name: &str, json: &mut Value, root: &mut Root) -> Result<(), String> {
     let names = variant_names(json);
     let Some(chosen) = names.iter().position(|own| own == name) else {

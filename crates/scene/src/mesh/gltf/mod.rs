@@ -39,11 +39,8 @@ const GLB_HEADER_BYTES: usize = 12;
 
 /// Reads a glTF file with its buffers and images; `warnings` counts the parts that are left out. With a
 /// budget, meshes whose copies exceed it are not copied; with a time, in seconds, nodes stand where the
-/// animations move them; with the name of a variant, primitives have its materials.
-///
-/// # Errors
-/// [`Error::Io`] for a file that cannot be read, [`Error::Parse`] for bad JSON, [`Error::Format`]
-/// for any other fault.
+/// animations move them; with the name of a variant, primitives have its materials. Fails with [`Error::Io`]
+/// for a file that cannot be read, with [`Error::Parse`] for bad JSON, else with [`Error::Format`].
 pub fn read(
     path: &Path,
     time: Option<f32>,

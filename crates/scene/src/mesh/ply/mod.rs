@@ -46,10 +46,8 @@ const COLOR_NAMES: [[&str; 4]; 4] = [
 /// Bytes of a vertex (position, normal, coordinates) or of the triangles of a face.
 const ELEMENT_BYTES: u64 = 32;
 
-/// Reads a PLY file, or one compressed by gzip if its extension is `gz`; warns of what it leaves out.
-///
-/// # Errors
-/// [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
+/// Reads a PLY file, or one compressed by gzip if its extension is `gz`; warns of what it leaves out. Fails
+/// with [`Error::Io`], or [`Error::Format`] that names the element and what was expected and found.
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Mesh> {
     let (reader, file_bytes) = files::open_unpacked(path)?;
     let mut source = Source {
