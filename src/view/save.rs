@@ -1,6 +1,6 @@
 //! Files that the window writes: its picture, the film, and the camera.
 
-use std::{fmt::Write, path::PathBuf};
+use std::path::PathBuf;
 
 use crate::{
     error::Result,
@@ -24,14 +24,14 @@ pub(super) fn camera_toml(camera: &Camera) -> String {
         camera.vertical_fov_deg
     );
     if camera.shift != [0.0; 2] {
-        let _ = writeln!(text, "shift = {:?}", camera.shift);
+        text += &format!("shift = {:?}\n", camera.shift);
     }
     if camera.mirrored {
         text += "mirrored = true\n";
     }
     if camera.aperture_radius > 0.0 {
         let (radius, distance) = (camera.aperture_radius, camera.focus_distance);
-        let _ = write!(text, "aperture_radius = {radius:?}\nfocus_distance = {distance:?}\n");
+        text += &format!("aperture_radius = {radius:?}\nfocus_distance = {distance:?}\n");
     }
     text
 }

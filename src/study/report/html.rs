@@ -1,7 +1,5 @@
 //! HTML building blocks: escaped text, readable numbers, tables.
 
-use std::fmt::Write;
-
 use crate::study::statistics::Interval;
 
 /// Escapes the special characters of HTML, for content and attributes.
@@ -105,13 +103,13 @@ impl Table {
             self.caption
         );
         for cell in &self.head {
-            let _ = write!(html, "<th scope=\"col\">{cell}</th>");
+            html += &format!("<th scope=\"col\">{cell}</th>");
         }
         html += "</tr></thead><tbody>";
         for (starts_group, cells) in &self.rows {
             html += if *starts_group { "<tr class=\"group\">" } else { "<tr>" };
             if let [heading, cells @ ..] = &cells[..] {
-                let _ = write!(html, "<th scope=\"row\">{heading}</th>");
+                html += &format!("<th scope=\"row\">{heading}</th>");
                 html.extend(cells.iter().map(|cell| format!("<td>{cell}</td>")));
             }
             html += "</tr>";

@@ -11,8 +11,6 @@ mod tables;
 mod verdict;
 mod viewer;
 
-use std::fmt::Write;
-
 use super::{
     folder::Folder,
     plan::{JUDGED_FROM, Rule},
@@ -94,8 +92,7 @@ fn start(report: &Report) -> String {
     }
     for scene in &report.scenes {
         if scene.reference_check.as_ref().is_some_and(|check| check.verdict == Verdict::Disagrees) {
-            let _ = write!(
-                html,
+            html += &format!(
                 "<p class=\"warning\"><strong class=\"warn\">The reference of {} is in \
                  doubt.</strong> An independent picture disagrees with it.</p>",
                 escape(&scene.name)
@@ -103,11 +100,11 @@ fn start(report: &Report) -> String {
         }
     }
     for note in &report.notes {
-        let _ = write!(html, "<p>{}</p>", escape(note));
+        html += &format!("<p>{}</p>", escape(note));
     }
     html += "<nav aria-label=\"Sections\"><ul>";
     let mut link = |id: &str, text: &str| {
-        let _ = write!(html, "<li><a href=\"#{id}\">{}</a></li>", escape(text));
+        html += &format!("<li><a href=\"#{id}\">{}</a></li>", escape(text));
     };
     if !report.summaries.is_empty() {
         link("glance", "At a glance");
@@ -141,7 +138,7 @@ fn scene_section(
         scene.triangles
     );
     if let Some(reference) = &scene.reference {
-        let _ = write!(html, "Reference: {}", escape(&reference.description));
+        html += &format!("Reference: {}", escape(&reference.description));
         let took = |seconds| format!(", it took {} s", number(seconds, 3));
         html += &match reference.mse {
             Some(mse) => format!(
@@ -171,16 +168,14 @@ fn scene_section(
         .filter(|summary| summary.scene == scene.name && !summary.mse_judged)
         .count();
     if refused > 0 {
-        let _ = write!(
-            html,
+        html += &format!(
             "<p class=\"warning\">Figures that are not judged, because the error is not well above the \
              reference's own: {refused}. A longer reference (<code>--reference-spp</code>) \
              helps.</p>"
         );
     }
     if let Some(part) = scene.parts.filter(|part| part.surface_share < 1.0) {
-        let _ = write!(
-            html,
+        html += &format!(
             "<p class=\"facts\">{} of the pixels see the environment directly. Their errors are those \
              of smoothing it, and are given apart from those of lit surfaces.</p>",
             html::percent(1.0 - part.surface_share)
@@ -188,7 +183,7 @@ fn scene_section(
     }
     let sentence = verdict::of_scene(report, scene);
     if !sentence.is_empty() {
-        let _ = write!(html, "<p class=\"verdict\">{sentence}</p>");
+        html += &format!("<p class=\"verdict\">{sentence}</p>");
     }
     html += &viewer::picture_group(index, scene, pictures);
     html += &curves::plots(report, scene);
@@ -201,7 +196,7 @@ fn end(report: &Report) -> String {
     let facts = &report.circumstances;
     let mut rows = String::new();
     let mut row = |what: &str, value: &str| {
-        let _ = write!(rows, "<dt>{what}</dt><dd>{value}</dd>");
+        rows += &format!("<dt>{what}</dt><dd>{value}</dd>");
     };
     row("Machine", &escape(&facts.machine));
     row("Device and driver", &format!("{} ({})", escape(&facts.device), escape(&facts.driver)));

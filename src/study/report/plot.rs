@@ -1,7 +1,5 @@
 //! Plots as inline SVG whose colours follow the page (classes `s0`, `s1`, … in `page.css`).
 
-use std::fmt::Write;
-
 use super::html::{escape, number};
 use crate::study::statistics::Interval;
 
@@ -125,8 +123,7 @@ impl Frame {
         let bottom = HEIGHT - BOTTOM;
         for tick in &self.x.ticks {
             let x = self.x(*tick);
-            let _ = write!(
-                svg,
+            svg += &format!(
                 "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{bottom}\"/>\
                  <text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
                 bottom + 17.0,
@@ -135,8 +132,7 @@ impl Frame {
         }
         for tick in &self.y.ticks {
             let y = self.y(*tick);
-            let _ = write!(
-                svg,
+            svg += &format!(
                 "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{:.1}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/>\
                  <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
                 WIDTH - RIGHT,
@@ -145,8 +141,7 @@ impl Frame {
                 self.y.label(*tick)
             );
         }
-        let _ = write!(
-            svg,
+        svg += &format!(
             "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{x_title}</text>\
              <text transform=\"translate(14 {:.1}) rotate(-90)\" text-anchor=\"middle\">{y_title}</text>",
             0.5 * (LEFT + WIDTH - RIGHT),
@@ -206,8 +201,7 @@ pub(crate) fn log_log(titles: [&str; 3], series: &[Series], slope: f64) -> Strin
         if slope < 0.0 { x.clamp(first, last) } else { x }
     };
     let [x0, x1] = [inside(x0), inside(x1)];
-    let _ = write!(
-        svg,
+    svg += &format!(
         "<line class=\"guide\" x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"><title>slope \
          {slope}</title></line>",
         frame.x(x0),
@@ -221,8 +215,7 @@ pub(crate) fn log_log(titles: [&str; 3], series: &[Series], slope: f64) -> Strin
         let lower = line.points.iter().rev().map(|point| place(point.x, point.y.low));
         let band: Vec<String> = upper.chain(lower).collect();
         let middle: Vec<String> = line.points.iter().map(|p| place(p.x, p.y.middle)).collect();
-        let _ = write!(
-            svg,
+        svg += &format!(
             "<g class=\"s{}\"><polygon class=\"band\" points=\"{}\"/><polyline class=\"line\" \
              points=\"{}\"/>",
             line.style % STYLE_COUNT,
@@ -253,8 +246,7 @@ pub(crate) fn scatter(titles: [&str; 3], series: &[Series], ranges: &[(&str, [f6
     let mut svg = frame.start(titles);
     for (label, range) in ranges {
         let [bottom, top] = range.map(|ordinate| frame.y(ordinate));
-        let _ = write!(
-            svg,
+        svg += &format!(
             "<rect class=\"range\" x=\"{LEFT}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>\
              <text class=\"small\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
             top - 1.0,
@@ -266,11 +258,10 @@ pub(crate) fn scatter(titles: [&str; 3], series: &[Series], ranges: &[(&str, [f6
         );
     }
     for dots in series {
-        let _ = write!(svg, "<g class=\"s{}\">", dots.style % STYLE_COUNT);
+        svg += &format!("<g class=\"s{}\">", dots.style % STYLE_COUNT);
         for point in &dots.points {
             let x = frame.x(point.x);
-            let _ = write!(
-                svg,
+            svg += &format!(
                 "<line class=\"bar\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/>{}",
                 frame.y(point.y.low),
                 frame.y(point.y.high),
@@ -292,8 +283,7 @@ fn labels(frame: &Frame, series: &[Series]) -> String {
         labelled.partition(|point| point.x > CROWDED_FROM);
     let mut svg = String::new();
     for point in free {
-        let _ = write!(
-            svg,
+        svg += &format!(
             "<text class=\"small\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
             frame.x(point.x) + 9.0,
             frame.y(point.y.middle) + 4.0,
@@ -311,8 +301,7 @@ fn labels(frame: &Frame, series: &[Series]) -> String {
     let start = (centre - 0.5 * height).clamp(TOP + 6.0, lowest);
     for (index, point) in crowded.iter().enumerate() {
         let y = start + SPACING * index as f64;
-        let _ = write!(
-            svg,
+        svg += &format!(
             "<line class=\"leader\" x1=\"{:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/><text \
              class=\"small\" x=\"{column:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
             column + 3.0,

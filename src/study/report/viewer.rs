@@ -1,7 +1,5 @@
 //! Pictures of a scene on the page: viewer, panes, error maps, magnified details.
 
-use std::fmt::Write;
-
 use super::{
     html::{escape, number},
     pictures::{Picture, ScenePictures},
@@ -63,8 +61,7 @@ pub(crate) fn picture_group(
         for (number, picture) in pictures.iter().enumerate() {
             let mut option = |is_error: bool, name: String| {
                 let selected = if number == chosen && !is_error { " selected" } else { "" };
-                let _ = write!(
-                    options,
+                options += &format!(
                     "<option value=\"{}\"{selected}>{name}</option>",
                     picture_class(index, number, is_error)
                 );
@@ -77,8 +74,7 @@ pub(crate) fn picture_group(
         options
     };
     for (number, picture) in pictures.iter().enumerate().filter(|(_, p)| !p.halves.is_empty()) {
-        let _ = write!(
-            html,
+        html += &format!(
             "<script type=\"application/octet-stream\" class=\"halves\" data-picture=\"{}\" \
              data-width=\"{}\">{}</script>",
             picture_class(index, number, false),
@@ -114,16 +110,14 @@ pub(crate) fn picture_group(
     html += "</div><h3>Details</h3><div class=\"crops\">";
     let mut frames = String::new();
     for (crop, name) in crops.iter().zip(["A", "B", "C"]) {
-        let _ = write!(
-            frames,
+        frames += &format!(
             "<div class=\"frame\" style=\"--left:{:.2}%;--top:{:.2}%;--side:{:.2}%\">{name}</div>",
             100.0 * crop.left,
             100.0 * crop.top,
             100.0 * crop.size
         );
     }
-    let _ = write!(
-        html,
+    html += &format!(
         "<figure><div class=\"pane\"><div class=\"picture {}\" role=\"img\" aria-label=\"where the \
          details lie\"></div>{frames}</div><figcaption>where samplers differ most on \
          surfaces</figcaption>\
@@ -140,16 +134,14 @@ pub(crate) fn picture_group(
     };
     html += "</div>";
     for (crop, name) in crops.iter().zip(["A", "B", "C"]) {
-        let _ = write!(
-            html,
+        html += &format!(
             "<div class=\"crop-row\" role=\"region\" tabindex=\"0\" aria-label=\"detail {name}\">"
         );
         for (number, picture) in pictures.iter().enumerate().filter(|item| is_magnified(&item)) {
             let caption = format!("{name}: {}", picture_name(picture));
             // Background positions are shares of the space left over.
             let position = |start: f64| 100.0 * start / (1.0 - crop.size).max(1e-6);
-            let _ = write!(
-                html,
+            html += &format!(
                 "<figure><div class=\"pane\"><div class=\"picture {}\" role=\"img\" \
                  aria-label=\"{caption}\" style=\"--size:{:.2}%;--px:{:.2}%;--py:{:.2}%\"></div>\
                  </div><figcaption>{caption}</figcaption></figure>",

@@ -18,7 +18,7 @@
 
 mod models;
 
-use std::{fmt::Write, path::Path};
+use std::path::Path;
 
 use glam::{DVec3, Vec3};
 
@@ -99,8 +99,7 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
                     let file = folder.write_mesh(&name, &part, is_flat, model.attributes)?;
                     let emitter = indented(&indented(&model.emitter));
                     let medium = indented(&indented(&interior(&scene.materials[index].kind)));
-                    _ = write!(
-                        xml,
+                    xml += &format!(
                         "    <shape type=\"ply\">\n        \
                          <string name=\"filename\" value=\"{file}\"/>\n        \
                          <boolean name=\"face_normals\" value=\"{is_flat}\"/>\n        \
@@ -148,8 +147,7 @@ fn sensor(scene: &Scene, parts: &[Parts], samples: u32) -> String {
     };
     let [origin, target, up] = [position, look_at, up].map(triple);
     let mirror = if mirrored { "<scale x=\"-1\"/>" } else { "" };
-    _ = write!(
-        xml,
+    xml += &format!(
         r#"        <string name="fov_axis" value="y"/>
         <transform name="to_world">{mirror}
             <lookat origin="{origin}" target="{target}" up="{up}"/>

@@ -1,9 +1,6 @@
 //! Materials → `bsdf` elements, and the light of their surfaces.
 
-use std::{
-    fmt::{Display, Write},
-    path::Path,
-};
+use std::{fmt::Display, path::Path};
 
 use glam::Vec3;
 
@@ -319,8 +316,7 @@ impl Translator<'_> {
             + &property("string", "wrap_mode", wrap(0));
         let [[a, b, c], [d, e, f]] = used.image_from_uv;
         if used.image_from_uv != SAME_UV {
-            _ = write!(
-                content,
+            content += &format!(
                 "    <transform name=\"to_uv\">\n        \
                  <matrix value=\"{a} {b} 0 {c}  {d} {e} 0 {f}  0 0 1 0  0 0 0 1\"/>\n    \
                  </transform>\n"

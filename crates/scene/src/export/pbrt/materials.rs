@@ -1,7 +1,5 @@
 //! Materials → named materials with their textures, and the light of their surfaces.
 
-use std::fmt::Write;
-
 use glam::{Mat3, Vec3};
 
 use super::triple;
@@ -211,11 +209,10 @@ impl<'a> Translator<'a> {
             Recipe::Number(_) | Recipe::Squared(_) | Recipe::Cut { .. } => "float",
             _ => "spectrum",
         };
-        _ = writeln!(
-            self.textures,
+        self.textures += &format!(
             "Texture \"{id}\" \"{kind}\" \"imagemap\" \"string filename\" \"{}\"\n    \
              \"string encoding\" \"{}\" \"string filter\" \"{}\" \"string wrap\" \"{wrap}\"\n    \
-             \"float udelta\" {du} \"float uscale\" {u} \"float vdelta\" {dv} \"float vscale\" {v}",
+             \"float udelta\" {du} \"float uscale\" {u} \"float vdelta\" {dv} \"float vscale\" {v}\n",
             self.folder.relative(&bitmap.name),
             if bitmap.is_raw { "linear" } else { "sRGB" },
             if bitmap.is_nearest { "point" } else { "bilinear" },

@@ -13,7 +13,7 @@
 
 mod materials;
 
-use std::{fmt::Write, path::Path};
+use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -72,21 +72,20 @@ pub fn export<'a>(scene: &'a Scene, path: &Path, settings: Settings) -> Export<'
                 continue;
             }
             let id = identifier(index, &scene.materials[index].name);
-            text += &model.text;
-            _ = write!(text, "AttributeBegin\nNamedMaterial \"{id}\"\n{}", model.light);
+            text +=
+                &format!("{}AttributeBegin\nNamedMaterial \"{id}\"\n{}", model.text, model.light);
             if let Some(absorption) = scene.materials[index].kind.absorption() {
                 let sigmas = rgb("sigma_a", absorption) + &rgb("sigma_s", Vec3::ZERO);
-                _ = writeln!(
-                    text,
+                text += &format!(
                     "MakeNamedMedium \"{id}\" \"string type\" \"homogeneous\"{sigmas}\n\
-                     MediumInterface \"{id}\" \"\""
+                     MediumInterface \"{id}\" \"\"\n"
                 );
             }
             for (part, is_flat) in parts.each() {
                 let name = format!("{id}{}.ply", if is_flat { "_flat" } else { "" });
                 let file = folder.write_mesh(&name, part, is_flat, model.attributes)?;
                 let alpha = &model.alpha;
-                _ = writeln!(text, "Shape \"plymesh\" \"string filename\" \"{file}\"{alpha}");
+                text += &format!("Shape \"plymesh\" \"string filename\" \"{file}\"{alpha}\n");
             }
             text += "AttributeEnd\n";
         }
@@ -111,8 +110,7 @@ fn view(scene: &Scene, settings: Settings, name: &str) -> String {
          \"float fov\" {fov}"
     );
     if aperture_radius > 0.0 {
-        _ = write!(
-            text,
+        text += &format!(
             " \"float lensradius\" {aperture_radius} \"float focaldistance\" {focus_distance}"
         );
     }
@@ -120,8 +118,7 @@ fn view(scene: &Scene, settings: Settings, name: &str) -> String {
         let height = if aspect > 1.0 { 2.0 } else { 2.0 / aspect };
         let [x, y] = shift.map(|share| f64::from(share) * height);
         let [half_width, half_height] = [0.5 * aspect * height, 0.5 * height];
-        _ = write!(
-            text,
+        text += &format!(
             " \"float screenwindow\" [{} {} {} {}]",
             x - half_width,
             x + half_width,
