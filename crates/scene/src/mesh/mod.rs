@@ -290,6 +290,23 @@ impl Mesh {
         Some(copy)
     }
 
+    /// Gives each triangle corners of its own, with these texture coordinates.
+    pub(crate) fn spread(&mut self, uvs: [[f32; 2]; 3]) {
+        fn repeat<T: Copy>(all: &mut Vec<T>, corners: &[u32]) {
+            if !all.is_empty() {
+                *all = corners.iter().map(|&corner| all[corner as usize]).collect();
+            }
+        }
+        let corners = self.triangles.as_flattened();
+        repeat(&mut self.positions, corners);
+        repeat(&mut self.normals, corners);
+        repeat(&mut self.colors, corners);
+        self.uvs[0] = uvs.repeat(self.triangles.len());
+        for (first, triangle) in (0..).step_by(3).zip(&mut self.triangles) {
+            *triangle = [first, first + 1, first + 2];
+        }
+    }
+
     fn start_object(&mut self, name: &str) {
         let (name, first_triangle) = (name.to_owned(), self.triangles.len());
         start_object(&mut self.objects, ObjectStart { name, first_triangle, first_instance: 0 });

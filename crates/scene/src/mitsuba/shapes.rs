@@ -239,7 +239,8 @@ impl Reader {
             shape.mesh.colors.clear();
         }
         if surface.reads_uvs() && shape.mesh.uvs[0].is_empty() {
-            spread_image(&mut shape.mesh);
+            // Mitsuba gives every triangle half of the image.
+            shape.mesh.spread([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
         }
         // Heights bend along the axes of their image, whose directions the triangles have.
         let has_tangents = surface.normal.as_ref().is_some_and(|normal| !self.reliefs.hold(normal));
@@ -347,23 +348,6 @@ fn placement(node: Node<'_>, matrix: DMat4) -> Result<Transform> {
 fn frame_along(axis: DVec3) -> Option<DMat3> {
     let (x, y) = axis.try_normalize()?.any_orthonormal_pair();
     Some(DMat3::from_cols(x, y, axis))
-}
-
-/// Gives every triangle of a mesh without texture coordinates half of the image, as Mitsuba does.
-fn spread_image(mesh: &mut Mesh) {
-    fn repeat<T: Copy>(all: &mut Vec<T>, corners: &[u32]) {
-        if !all.is_empty() {
-            *all = corners.iter().map(|&corner| all[corner as usize]).collect();
-        }
-    }
-    let corners = mesh.triangles.as_flattened();
-    repeat(&mut mesh.positions, corners);
-    repeat(&mut mesh.normals, corners);
-    repeat(&mut mesh.colors, corners);
-    mesh.uvs[0] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].repeat(mesh.triangles.len());
-    for (first, triangle) in (0..).step_by(3).zip(&mut mesh.triangles) {
-        *triangle = [first, first + 1, first + 2];
-    }
 }
 
 /// Tangents of vertices along u, as the bumps of a normal map need them: the bitangent is the normal ×

@@ -311,23 +311,13 @@ fn face_normals(mesh: &mut Mesh) {
 /// Gives a mesh without texture coordinates those of pbrt: (0, 0), (1, 0) and (1, 1) on every triangle. Fails
 /// for more corners than indices can address.
 pub(super) fn give_coordinates(mesh: &mut Mesh) -> Result<(), String> {
-    if !mesh.uvs[0].is_empty() || mesh.triangles.is_empty() {
+    if !mesh.uvs[0].is_empty() {
         return Ok(());
     }
-    let count = mesh.triangles.len() * 3;
-    if count > 3 * MAX_TRIANGLES {
+    if mesh.triangles.len() > MAX_TRIANGLES {
         return Err("too many triangles without texture coordinates under a texture".to_owned());
     }
-    let order: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
-    let pick = |values: &[[f32; 3]]| -> Vec<[f32; 3]> {
-        if values.is_empty() {
-            return Vec::new();
-        }
-        order.iter().map(|&at| values[at as usize]).collect()
-    };
-    (mesh.positions, mesh.normals) = (pick(&mesh.positions), pick(&mesh.normals));
-    mesh.uvs[0] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]].repeat(mesh.triangles.len());
-    mesh.triangles = (0..count as u32 / 3).map(|face| [0, 1, 2].map(|at| 3 * face + at)).collect();
+    mesh.spread([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
     Ok(())
 }
 
