@@ -109,9 +109,7 @@ impl EnvironmentMap {
         };
         along(row.saturating_sub(1)).lerp(along(row.min(self.height - 1)), position.y)
     }
-}
 
-impl EnvironmentMap {
     /// Builds the map named `source` from its texels before scaling.
     fn procedural(source: &str, width: u32, mut texels: Vec<Vec3>, scale: f32) -> Self {
         texels.par_iter_mut().for_each(|texel| *texel *= scale);

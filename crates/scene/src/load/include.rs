@@ -178,27 +178,7 @@ impl Loader<'_> {
         warnings.extend(ignored.warnings(path));
         Ok((materials, geometry, lamps))
     }
-}
 
-/// Places a lamp of a file. Intensities grow with the square of the scale, so that the lamp lights its
-/// file as before, and as surfaces that emit do.
-fn place_lamp(mut lamp: Lamp, transform: &Transform) -> Lamp {
-    let area = transform.linear.determinant().abs().powf(2.0 / 3.0);
-    if let LampKind::Point { position, intensity }
-    | LampKind::Spot(Spot { position, intensity, .. }) = &mut lamp.kind
-    {
-        *position = transform.position(position.to_array()).into();
-        *intensity *= area;
-    }
-    if let LampKind::Spot(Spot { direction, .. }) | LampKind::Directional { direction, .. } =
-        &mut lamp.kind
-    {
-        *direction = (transform.linear * *direction).normalize_or(*direction);
-    }
-    lamp
-}
-
-impl Loader<'_> {
     /// Reads the file at the loader's path by its extension; none for a format that is no whole scene.
     pub(super) fn import(&self) -> Result<Option<Imported>> {
         let camera = self.options.camera.as_deref();
@@ -254,4 +234,22 @@ impl Loader<'_> {
         }
         Ok(self.finished(scene))
     }
+}
+
+/// Places a lamp of a file. Intensities grow with the square of the scale, so that the lamp lights its
+/// file as before, and as surfaces that emit do.
+fn place_lamp(mut lamp: Lamp, transform: &Transform) -> Lamp {
+    let area = transform.linear.determinant().abs().powf(2.0 / 3.0);
+    if let LampKind::Point { position, intensity }
+    | LampKind::Spot(Spot { position, intensity, .. }) = &mut lamp.kind
+    {
+        *position = transform.position(position.to_array()).into();
+        *intensity *= area;
+    }
+    if let LampKind::Spot(Spot { direction, .. }) | LampKind::Directional { direction, .. } =
+        &mut lamp.kind
+    {
+        *direction = (transform.linear * *direction).normalize_or(*direction);
+    }
+    lamp
 }

@@ -146,15 +146,7 @@ impl Loader<'_> {
             )
         })
     }
-}
 
-/// Lengths of edges, metres: products of three of them stay far inside single precision.
-const EDGES: (f32, f32) = (1e-6, 1e6);
-
-/// Largest cosine between edges that counts as a right angle: a twentieth of a degree.
-const RIGHT_ANGLE: f32 = 1e-3;
-
-impl Loader<'_> {
     pub(super) fn portals(&self, entries: &[Entry<PortalKeys>]) -> Result<Vec<Portal>> {
         self.check(entries.len() <= MAX_PORTALS, || {
             format!(
@@ -200,3 +192,9 @@ impl Loader<'_> {
         })
     }
 }
+
+/// Lengths of edges, metres: products of three of them stay far inside single precision.
+const EDGES: (f32, f32) = (1e-6, 1e6);
+
+/// Largest cosine between edges that counts as a right angle: a twentieth of a degree.
+const RIGHT_ANGLE: f32 = 1e-3;

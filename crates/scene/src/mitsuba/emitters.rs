@@ -126,32 +126,7 @@ impl Reader {
         let (radiance, texture) = value.split();
         Ok(Some(Emission { radiance, texture, two_sided: false }))
     }
-}
 
-fn light(parameters: &Parameters<'_>, name: &str) -> Result<Vec3> {
-    Ok(spectra::parameter(parameters, name, Role::Light)?.unwrap_or(Vec3::ONE))
-}
-
-fn point(parameters: &Parameters<'_>) -> Result<LampKind> {
-    let position = match parameters.vector("position")? {
-        Some(position) => position,
-        None => parameters.transform("to_world")?.w_axis.truncate().as_vec3(),
-    };
-    Ok(LampKind::Point { position, intensity: light(parameters, "intensity")? })
-}
-
-fn directional(parameters: &Parameters<'_>) -> Result<LampKind> {
-    let node = parameters.node;
-    let direction = match parameters.vector("direction")? {
-        Some(direction) => direction
-            .try_normalize()
-            .ok_or_else(|| node.error("direction: expected a vector other than 0, found 0 0 0"))?,
-        None => turned(node, parameters.transform("to_world")?, DVec3::Z)?.as_vec3(),
-    };
-    Ok(LampKind::Directional { direction, irradiance: light(parameters, "irradiance")? })
-}
-
-impl Reader {
     pub(super) fn daylight(&mut self, parameters: &Parameters<'_>) -> Result<EnvironmentMap> {
         let node = parameters.node;
         let is_old = node.version() < 2.0;
@@ -201,6 +176,64 @@ impl Reader {
         };
         Ok(daylight.map(1.0))
     }
+
+    /// Lets a dielectric absorb as the medium inside it does; names a medium that scatters, or that
+    /// another surface bounds.
+    pub(super) fn fill(&mut self, kind: &mut MaterialKind, medium: Node<'_>) -> Result<()> {
+        match (kind, self.absorption(medium)?) {
+            (MaterialKind::Dielectric { absorption, .. }, Some(found)) => *absorption = found,
+            _ => self.ignored.add(features::MI_MEDIUM, || medium.place()),
+        }
+        Ok(())
+    }
+
+    /// Absorption coefficient, per metre, of a medium that scatters no light.
+    fn absorption(&mut self, medium: Node<'_>) -> Result<Option<Vec3>> {
+        if medium.kind() != "homogeneous" {
+            return Ok(None);
+        }
+        let parameters = Parameters::new(medium);
+        let color = |name: &str| spectra::parameter(&parameters, name, Role::Index);
+        // Mitsuba 0.6 names absorption and scattering, Mitsuba 3 their sum and the share of scattering.
+        let (absorption, scattered) = match color("sigma_a")? {
+            Some(absorption) => (absorption, color("sigma_s")?.unwrap_or(Vec3::ZERO)),
+            None => {
+                let albedo = color("albedo")?.unwrap_or(Vec3::splat(0.75));
+                (color("sigma_t")?.unwrap_or(Vec3::ONE), albedo)
+            }
+        };
+        let scale = parameters.float_in("scale", (0.0, 1e6))?.unwrap_or(1.0);
+        if scattered != Vec3::ZERO {
+            return Ok(None);
+        }
+        parameters.objects("phase")?;
+        parameters.without_effect("sample_emitters");
+        parameters.finish(&mut self.ignored);
+        Ok(Some((scale * absorption).clamp(Vec3::ZERO, Vec3::splat(1e6))))
+    }
+}
+
+fn light(parameters: &Parameters<'_>, name: &str) -> Result<Vec3> {
+    Ok(spectra::parameter(parameters, name, Role::Light)?.unwrap_or(Vec3::ONE))
+}
+
+fn point(parameters: &Parameters<'_>) -> Result<LampKind> {
+    let position = match parameters.vector("position")? {
+        Some(position) => position,
+        None => parameters.transform("to_world")?.w_axis.truncate().as_vec3(),
+    };
+    Ok(LampKind::Point { position, intensity: light(parameters, "intensity")? })
+}
+
+fn directional(parameters: &Parameters<'_>) -> Result<LampKind> {
+    let node = parameters.node;
+    let direction = match parameters.vector("direction")? {
+        Some(direction) => direction
+            .try_normalize()
+            .ok_or_else(|| node.error("direction: expected a vector other than 0, found 0 0 0"))?,
+        None => turned(node, parameters.transform("to_world")?, DVec3::Z)?.as_vec3(),
+    };
+    Ok(LampKind::Directional { direction, irradiance: light(parameters, "irradiance")? })
 }
 
 fn moment(parameters: &Parameters<'_>) -> Result<Moment> {
@@ -311,41 +344,4 @@ fn resampled_rows(map: &EnvironmentMap) -> Vec<Vec3> {
         texels.extend(pairs.map(|(above, below)| above.lerp(*below, share)));
     }
     texels
-}
-
-impl Reader {
-    /// Lets a dielectric absorb as the medium inside it does; names a medium that scatters, or that
-    /// another surface bounds.
-    pub(super) fn fill(&mut self, kind: &mut MaterialKind, medium: Node<'_>) -> Result<()> {
-        match (kind, self.absorption(medium)?) {
-            (MaterialKind::Dielectric { absorption, .. }, Some(found)) => *absorption = found,
-            _ => self.ignored.add(features::MI_MEDIUM, || medium.place()),
-        }
-        Ok(())
-    }
-
-    /// Absorption coefficient, per metre, of a medium that scatters no light.
-    fn absorption(&mut self, medium: Node<'_>) -> Result<Option<Vec3>> {
-        if medium.kind() != "homogeneous" {
-            return Ok(None);
-        }
-        let parameters = Parameters::new(medium);
-        let color = |name: &str| spectra::parameter(&parameters, name, Role::Index);
-        // Mitsuba 0.6 names absorption and scattering, Mitsuba 3 their sum and the share of scattering.
-        let (absorption, scattered) = match color("sigma_a")? {
-            Some(absorption) => (absorption, color("sigma_s")?.unwrap_or(Vec3::ZERO)),
-            None => {
-                let albedo = color("albedo")?.unwrap_or(Vec3::splat(0.75));
-                (color("sigma_t")?.unwrap_or(Vec3::ONE), albedo)
-            }
-        };
-        let scale = parameters.float_in("scale", (0.0, 1e6))?.unwrap_or(1.0);
-        if scattered != Vec3::ZERO {
-            return Ok(None);
-        }
-        parameters.objects("phase")?;
-        parameters.without_effect("sample_emitters");
-        parameters.finish(&mut self.ignored);
-        Ok(Some((scale * absorption).clamp(Vec3::ZERO, Vec3::splat(1e6))))
-    }
 }

@@ -414,43 +414,7 @@ impl<'a> Materials<'a> {
         }
         Ok(Some(material))
     }
-}
 
-/// Diffuse reflectance of a medium of the reduced albedo `albedo` by the dipole of \[Jensen et al. 2001\],
-/// with their fit to what a surface of refractive index `ior` throws back inside.
-fn diffusion_albedo(albedo: Vec3, ior: f32) -> Vec3 {
-    let inside = -1.44 / (ior * ior) + 0.71 / ior + 0.668 + 0.0636 * ior;
-    let inside = inside.clamp(0.0, 0.99);
-    let boundary = (1.0 + inside) / (1.0 - inside);
-    albedo.clamp(Vec3::ZERO, Vec3::ONE).map(|albedo| {
-        let depth = (3.0 * (1.0 - albedo)).sqrt();
-        let shown = 0.5 * albedo * (1.0 + (-4.0 / 3.0 * boundary * depth).exp()) * (-depth).exp();
-        // A medium that does nothing has no albedo.
-        shown.min(1.0)
-    })
-}
-
-pub(super) fn set_opacity(surface: &mut Surface, value: Value) {
-    match value {
-        Value::Image(image) => surface.opacity.texture = Some(image),
-        constant => surface.opacity.factor = constant.mean().x.clamp(0.0, 1.0),
-    }
-}
-
-/// Extinction coefficient of a metal of refractive index η = 1 and this reflectance, which pbrt takes for it.
-fn extinction_of_metal(reflectance: Vec3) -> Vec3 {
-    let color = reflectance.clamp(Vec3::ZERO, Vec3::splat(0.9999));
-    2.0 * color.map(f32::sqrt) / (Vec3::ONE - color).map(f32::sqrt)
-}
-
-/// Returns the constant colour of a model, 1 if a texture gives it.
-fn color(value: Value, surface: &mut Surface) -> Vec3 {
-    let (color, texture) = value.split();
-    surface.color = texture;
-    color
-}
-
-impl Materials<'_> {
     /// Lets a dielectric absorb as the medium inside it does; names a medium that does more, or that
     /// another surface bounds.
     pub(super) fn fill(
@@ -487,6 +451,40 @@ impl Materials<'_> {
         medium.find("g");
         Ok(is_clear.then_some(absorption))
     }
+}
+
+/// Diffuse reflectance of a medium of the reduced albedo `albedo` by the dipole of \[Jensen et al. 2001\],
+/// with their fit to what a surface of refractive index `ior` throws back inside.
+fn diffusion_albedo(albedo: Vec3, ior: f32) -> Vec3 {
+    let inside = -1.44 / (ior * ior) + 0.71 / ior + 0.668 + 0.0636 * ior;
+    let inside = inside.clamp(0.0, 0.99);
+    let boundary = (1.0 + inside) / (1.0 - inside);
+    albedo.clamp(Vec3::ZERO, Vec3::ONE).map(|albedo| {
+        let depth = (3.0 * (1.0 - albedo)).sqrt();
+        let shown = 0.5 * albedo * (1.0 + (-4.0 / 3.0 * boundary * depth).exp()) * (-depth).exp();
+        // A medium that does nothing has no albedo.
+        shown.min(1.0)
+    })
+}
+
+pub(super) fn set_opacity(surface: &mut Surface, value: Value) {
+    match value {
+        Value::Image(image) => surface.opacity.texture = Some(image),
+        constant => surface.opacity.factor = constant.mean().x.clamp(0.0, 1.0),
+    }
+}
+
+/// Extinction coefficient of a metal of refractive index η = 1 and this reflectance, which pbrt takes for it.
+fn extinction_of_metal(reflectance: Vec3) -> Vec3 {
+    let color = reflectance.clamp(Vec3::ZERO, Vec3::splat(0.9999));
+    2.0 * color.map(f32::sqrt) / (Vec3::ONE - color).map(f32::sqrt)
+}
+
+/// Returns the constant colour of a model, 1 if a texture gives it.
+fn color(value: Value, surface: &mut Surface) -> Vec3 {
+    let (color, texture) = value.split();
+    surface.color = texture;
+    color
 }
 
 fn exact(eta: Vec3, k: Vec3) -> ConductorFresnel {

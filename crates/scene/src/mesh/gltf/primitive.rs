@@ -229,17 +229,7 @@ impl GltfReader<'_> {
         self.mesh.materials[material].material.surface.vertex_color = true;
         Ok(colors)
     }
-}
 
-/// Bytes of a matrix of singles.
-const MATRIX_BYTES: usize = 64;
-
-pub(super) enum Place<'j> {
-    Node(Mat4),
-    Joints(&'j [Mat4]),
-}
-
-impl GltfReader<'_> {
     /// Adds the mesh of a node with a skin; `worlds` places the nodes of the scene. The node itself does not
     /// place the mesh.
     pub(super) fn read_skinned(&mut self, node: &Node, worlds: &[Option<Mat4>]) -> Result<()> {
@@ -336,4 +326,12 @@ impl GltfReader<'_> {
         }
         Ok(matrices.first().is_some_and(|matrix| matrix.determinant() < 0.0))
     }
+}
+
+/// Bytes of a matrix of singles.
+const MATRIX_BYTES: usize = 64;
+
+pub(super) enum Place<'j> {
+    Node(Mat4),
+    Joints(&'j [Mat4]),
 }
