@@ -311,9 +311,8 @@ fn convert(lamp: &Lamp, groups: &LightGroups) -> structs::Lamp {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
+    use crate::pass::lamp_cells::tests::parsed;
 
     /// The draws follow the power: of a triangle that emits to one side or two, of spots, whose light from
     /// the inner to the outer angle counts by half, and of directional lamps on the disc that hides all.
@@ -337,9 +336,7 @@ mod tests {
             .to_owned()
             + &square("one", "", 0.0)
             + &square("two", "emission_two_sided = true", 4.0);
-        let scene = Scene::parse(Path::new("a.toml"), &text).unwrap();
-        let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
-        let tables = LampTables::new(&scene, &accel, &LightGroups::new(&scene));
+        let (_, accel, tables) = parsed(&text);
         // After the environment's.
         assert!(tables.lamps.iter().map(|lamp| lamp.light_group).eq(1..4), "{:?}", tables.lamps);
         let mut drawn = [0.0; 5];

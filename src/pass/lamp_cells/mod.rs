@@ -28,7 +28,7 @@ use crate::{
         equal_area::direction_from_square,
         random::{hash_4d, unit_float},
     },
-    scene::{Camera, Scene},
+    scene::{Camera, Material, Scene},
     shader::{
         constants::{
             LAMP_BIT, LAMP_DIRECTIONAL, LAMP_POINT, LAMP_SPOT_LINEAR_ANGLE,
@@ -200,18 +200,7 @@ impl LampCells {
         let clusters = &tables.clusters;
         stage::enter(format_args!("looking for {} groups of lamps", clusters.len()));
         let rays = MOST_TRIED.min(clusters.len()) * PLACES;
-        let survey = Survey {
-            accel,
-            tables,
-            passes: scene.materials.iter().map(surfaces::passes).collect(),
-            two_sided: scene
-                .materials
-                .iter()
-                .map(|material| material.surface.emission.as_ref().is_some_and(|e| e.two_sided))
-                .collect(),
-            radius: radius(scene.geometry.extent()),
-            offset: accel.ray_offset(),
-        };
+        let survey = Survey::new(scene, accel, tables);
         let walked = |camera| -> Vec<Place> {
             (0..WALKS).into_par_iter().flat_map_iter(|walk| survey.walk(walk, camera)).collect()
         };
@@ -279,7 +268,21 @@ struct Survey<'a> {
     offset: f32,
 }
 
-impl Survey<'_> {
+impl<'a> Survey<'a> {
+    fn new(scene: &Scene, accel: &'a Accel, tables: &'a LampTables) -> Self {
+        let emits_twice = |material: &Material| {
+            material.surface.emission.as_ref().is_some_and(|emission| emission.two_sided)
+        };
+        Self {
+            accel,
+            tables,
+            passes: scene.materials.iter().map(surfaces::passes).collect(),
+            two_sided: scene.materials.iter().map(emits_twice).collect(),
+            radius: radius(scene.geometry.extent()),
+            offset: accel.ray_offset(),
+        }
+    }
+
     /// Follows paths from the camera, or light from a lamp, every second time from a triangle, over diffuse
     /// surfaces.
     fn walk(&self, walk: u32, camera: Option<&Camera>) -> Vec<Place> {
@@ -558,4 +561,4 @@ fn list_of(
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -7,6 +7,13 @@ use std::path::Path;
 use super::*;
 use crate::scene::light_group::LightGroups;
 
+pub(in crate::pass) fn parsed(text: &str) -> (Scene, Accel, LampTables) {
+    let scene = Scene::parse(Path::new("a.toml"), text).unwrap();
+    let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
+    let tables = LampTables::new(&scene, &accel, &LightGroups::new(&scene));
+    (scene, accel, tables)
+}
+
 /// A box of 1 m far away, whose far side is seen too if it emits to both sides.
 #[test]
 fn draws_of_a_lamp_add_up_to_its_irradiance() {
@@ -18,19 +25,10 @@ fn draws_of_a_lamp_add_up_to_its_irradiance() {
              emission = [3, 3, 3]\n{keys}[[object]]\nshape = \"box\"\nsize = [1, 1, 1]\n\
              material = \"lamp\"\n"
         );
-        let scene = Scene::parse(Path::new("a.toml"), &text).unwrap();
-        let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
-        let tables = LampTables::new(&scene, &accel, &LightGroups::new(&scene));
+        let (scene, accel, tables) = parsed(&text);
         let columns = 0..tables.source_count;
         let cluster = Cluster { columns, power: tables.total, centre: None };
-        let survey = Survey {
-            accel: &accel,
-            tables: &tables,
-            passes: vec![false],
-            two_sided: vec![sides > 1.0],
-            radius: 1.0,
-            offset: accel.ray_offset(),
-        };
+        let survey = Survey::new(&scene, &accel, &tables);
         let irradiance = |draw| {
             let numbers = hash_4d([draw, 1, 2, 3]);
             f64::from(survey.light(&cluster, Vec3::new(0.0, 0.0, 100.0), numbers).irradiance)
@@ -51,17 +49,8 @@ fn lists_and_estimates_have_closed_forms() {
                 translate = [0, -0.5, 0]\n"
         .to_owned()
         + &lamp.repeat(60);
-    let scene = Scene::parse(Path::new("a.toml"), &text).unwrap();
-    let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
-    let tables = LampTables::new(&scene, &accel, &LightGroups::new(&scene));
-    let survey = Survey {
-        accel: &accel,
-        tables: &tables,
-        passes: vec![false],
-        two_sided: vec![false],
-        radius: 1.0,
-        offset: accel.ray_offset(),
-    };
+    let (scene, accel, tables) = parsed(&text);
+    let survey = Survey::new(&scene, &accel, &tables);
     let place = |normal| Place { position: Vec3::ZERO, normal };
     // All are estimated alike: 48 by rays, twelve by their share.
     let list = survey.list(0, &[place(Vec3::Y); 4], 0.5, MOST_ENTRIES);
@@ -99,16 +88,8 @@ fn a_wall_beyond_a_lamp_behind_a_pane_hides_nothing() {
         .to_owned()
         + &part("pane", "type = \"thin_dielectric\"", 1.0)
         + &part("wall", "type = \"diffuse\"\nreflectance = [0, 0, 0]", 2.5);
-    let scene = Scene::parse(Path::new("a.toml"), &text).unwrap();
-    let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
-    let survey = Survey {
-        accel: &accel,
-        tables: &LampTables::default(),
-        passes: vec![true, false],
-        two_sided: vec![false; 2],
-        radius: 1.0,
-        offset: accel.ray_offset(),
-    };
+    let (scene, accel, tables) = parsed(&text);
+    let survey = Survey::new(&scene, &accel, &tables);
     // The origin moves to the pane.
     for (farthest, is_hidden) in [(2.0, false), (3.0, true)] {
         let mut origin = Vec3::ZERO;
@@ -144,9 +125,7 @@ fn cells_are_finer_where_the_camera_looks() {
              reflectance = [0, 0, 0]\n[[object]]\nshape = \"box\"\nsize = [40, 1, 2]\n\
              material = \"floor\"\ntranslate = [20, -0.5, 0]\n{lamps}"
         );
-        let scene = Scene::parse(Path::new("a.toml"), &text).unwrap();
-        let accel = Accel::build(&scene.geometry, 1 << 20).unwrap();
-        let tables = LampTables::new(&scene, &accel, &LightGroups::new(&scene));
+        let (scene, accel, tables) = parsed(&text);
         let cells = LampCells::new(&scene, &accel, &tables);
         // Lists along a metre of the floor.
         let lists_at = |middle: f32| {
