@@ -16,7 +16,7 @@ UPDATES(counters)
 
 // Adds a feature of the samples to its layer. Sample by sample, as below.
 #define ADD_FEATURE(layer, film, feature) \
-    if ((wave.aovs & layer) != 0u) { \
+    if ((AOVS & layer) != 0u) { \
         vec3 sum = film[place]; \
         for (uint i = 0u; i < wave.sample_count; ++i) { \
             sum += features[i * wave.pixel_count + pixel].feature; \
@@ -28,7 +28,7 @@ void deposit_pixel(uint pixel, PathIndex index) {
     // Training rays are counted, but their light stays out of the picture.
     bool adds = wave.is_training == 0u;
     uint place = adds ? film_place(index) : 0u;
-    bool wants_unfiltered = adds && (wave.aovs & AOV_UNFILTERED) != 0u;
+    bool wants_unfiltered = adds && (AOVS & AOV_UNFILTERED) != 0u;
     vec3 unfiltered = wants_unfiltered ? film_unfiltered[place] : vec3(0.0);
     uint bounce_rays = 0u;
     uint dropped = 0u;
@@ -62,7 +62,7 @@ void deposit_pixel(uint pixel, PathIndex index) {
         ADD_FEATURE(AOV_NORMAL, film_normal, normal)
         ADD_FEATURE(AOV_POSITION, film_position, position)
     }
-    if (adds && (wave.aovs & AOV_VISIBLE) != 0u) {
+    if (adds && (AOVS & AOV_VISIBLE) != 0u) {
         film_visible[place] += shadow_rays;
     }
     atomicAdd(counters.camera_rays, wave.sample_count);

@@ -37,11 +37,11 @@ void count_mattes(uint pixel, PathIndex index) {
             continue;
         }
         uint instance = load_hit_instance(path);
-        if ((wave.aovs & AOV_OBJECTS) != 0u) {
+        if ((AOVS & AOV_OBJECTS) != 0u) {
             uint object = object_of(triangle, instance);
             COUNT(film_objects, first, object)
         }
-        if ((wave.aovs & AOV_MATERIALS) != 0u) {
+        if ((AOVS & AOV_MATERIALS) != 0u) {
             uint material = material_identifiers[triangle_material(triangle, instance)];
             COUNT(film_materials, first, material)
         }

@@ -12,6 +12,9 @@ layout(scalar, push_constant) uniform WaveConstants {
 // Number of groups of lights whose light is kept apart.
 layout(constant_id = CONSTANT_LIGHT_GROUPS) const uint LIGHT_GROUPS = 0u;
 
+// Bits AOV_... of the extra film buffers that are written.
+layout(constant_id = CONSTANT_AOVS) const uint AOVS = 0u;
+
 // Dimensions of random_2d and random_1d along a path: DIMENSION_FILTER and DIMENSION_LENS for the camera,
 // then DIMENSIONS_PER_VERTEX each from DIMENSION_VERTEX on.
 const uint DIMENSION_LENS = 1u;

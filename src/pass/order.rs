@@ -10,9 +10,9 @@ use super::{
 };
 use crate::shader::{
     constants::{
-        AOV_ALBEDO, AOV_MATERIALS, AOV_NORMAL, AOV_OBJECTS, AOV_POSITION, CONSTANT_ONLY_SPECULAR,
-        PATH_LISTS, SURFACES_EMITTING, SURFACES_ROUGH_GLASS, SURFACES_SPECULAR, SURFACES_TEXTURED,
-        TRAINING_WAVE,
+        AOV_ALBEDO, AOV_MATERIALS, AOV_NORMAL, AOV_OBJECTS, AOV_POSITION, CONSTANT_AOVS,
+        CONSTANT_ONLY_SPECULAR, PATH_LISTS, SURFACES_EMITTING, SURFACES_ROUGH_GLASS,
+        SURFACES_SPECULAR, SURFACES_TEXTURED, TRAINING_WAVE,
     },
     structs::Wave,
 };
@@ -124,7 +124,7 @@ pub fn wave_order(
     if let Some(sharing) = order.sharing {
         order.dispatches.extend(sharing.connect_and_share(&order.wave));
     }
-    order.add(Kernel::new("deposit", Domain::Pixels, &[]));
+    order.add(Kernel::new("deposit", Domain::Pixels, &[(CONSTANT_AOVS, settings.aovs)]));
     WaveOrder { vertices, end: order.dispatches }
 }
 
@@ -310,7 +310,8 @@ impl<'a> Order<'a> {
         let Wave { vertex, aovs, is_training, .. } = self.wave;
         let surfaces = self.settings.surfaces;
         if vertex == 0 && aovs & (AOV_OBJECTS | AOV_MATERIALS) != 0 && is_training == 0 {
-            self.add_over("mattes", Domain::Pixels);
+            let constants = [&surfaces.constants()[..], &[(CONSTANT_AOVS, aovs)]].concat();
+            self.add(Kernel::new("mattes", Domain::Pixels, &constants));
         }
         let is_asked_for = aovs & FEATURES != 0 && is_training == 0;
         if is_asked_for && vertex == 0 {

@@ -109,6 +109,8 @@ specializations! {
     CONSTANT_LAMP_CANDIDATES;
     /// Groups of lights that all passes of a wave keep apart.
     CONSTANT_LIGHT_GROUPS;
+    /// Bits `AOV_…` of the extra film buffers that `deposit` and `mattes` write.
+    CONSTANT_AOVS;
 
     // Specialization constant of the passes that share paths.
     /// Edge of a cohort, pixels: 2, 4 or 8.
@@ -176,7 +178,7 @@ constants! {
     /// neighbouring rays.
     FILM_BLOCK = 8;
 
-    // Bits of `Wave::aovs`: film layers to write.
+    // Bits of `CONSTANT_AOVS`: film layers to write.
     /// Albedo.
     AOV_ALBEDO = 1;
     /// Shading normal.
