@@ -7,7 +7,7 @@
 layout(constant_id = CONSTANT_ONLY_SPECULAR) const bool ONLY_SPECULAR = false;
 
 void bounce_path(uint path) {
-    Hit hit = hits[path];
+    Hit hit = load_hit(path);
     Material material;
     bool samples_light = hit.material != NO_MATERIAL;
     if ((ONLY_SPECULAR && samples_light) || !goes_on_from(path, hit, material)) {

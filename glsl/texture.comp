@@ -91,7 +91,7 @@ void read_textures(uint path) {
     }
     hit_surfaces[path] = Surface(
         clamp((is_glass(material) ? material.eta : material.reflectance) * color, 0.0, 1.0), width.alpha,
-        clamp(material.ior * metallic, 0.0, 1.0), width.anisotropy);
+        clamp(material.ior * metallic, 0.0, 1.0), width.anisotropy, 0.0);
 }
 
 WALK_PATHS(read_textures)

@@ -15,7 +15,7 @@ layout(constant_id = CONSTANT_BOUNCE_CANDIDATES) const uint BOUNCE_CANDIDATES = 
 
 void bounce_path(uint path) {
     path_cells[path].teaches = NOTHING_TO_LEARN;
-    Hit hit = hits[path];
+    Hit hit = load_hit(path);
     Material material;
     if (!goes_on_from(path, hit, material)) {
         rays[path].is_active = 0u;

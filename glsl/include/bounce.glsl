@@ -11,7 +11,6 @@
 #include "specular.glsl"
 
 UPDATES(rays)
-READS(hits)
 UPDATES(paths)
 
 // First vertex at which russian roulette may end a path.
@@ -47,8 +46,7 @@ vec3 bounce_factor(
 bool follow_bounce(
     uint path, PathIndex index, Hit hit, vec3 direction, float brdf_pdf, vec3 factor, uint number,
     uint seed) {
-    PathState state = paths[path];
-    vec3 throughput = state.throughput * factor;
+    vec3 throughput = paths[path].throughput * factor;
     float strongest = largest_of(throughput);
     if (wave.vertex + 1u >= ROULETTE_VERTEX && strongest > 0.0) {
         float survival = min(1.0, strongest / ROULETTE_THROUGHPUT);
@@ -58,9 +56,8 @@ bool follow_bounce(
         strongest = u_roulette < survival ? strongest : 0.0;
     }
     bool alive = strongest > 0.0;
-    state.throughput = throughput;
-    state.rays_traced += alive ? 1u : 0u;
-    paths[path] = state;
+    paths[path].throughput = throughput;
+    paths[path].rays_traced += alive ? 1u : 0u;
     rays[path] = Ray(
         offset_ray_origin(hit.position, hit.geometric_normal, direction), alive ? 1u : 0u,
         direction, brdf_pdf);

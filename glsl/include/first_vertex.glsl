@@ -13,7 +13,7 @@ Reflector first_reflector(FirstVertex vertex, Frame frame) {
     if (IS_TEXTURED) {
         material = varied(
             material,
-            Surface(vertex.reflectance, vertex.alpha, vertex.metallic, vertex.anisotropy));
+            Surface(vertex.reflectance, vertex.alpha, vertex.metallic, vertex.anisotropy, 0.0));
     }
     return reflector_from(material, to_local(frame, vertex.outgoing));
 }

@@ -3,13 +3,13 @@
 #include "load.glsl"
 #include "surfaces.glsl"
 
-READS(hit_surfaces)
+LOADS(Surface, load_hit_surface, hit_surface_texels)
 
 // Loads the material at the hit of a path; `index` is that of the material.
 Material load_surface(uint path, uint index) {
     Material material = load_material(index);
     if (IS_TEXTURED) {
-        material = varied(material, hit_surfaces[path]);
+        material = varied(material, load_hit_surface(path));
     }
     return material;
 }

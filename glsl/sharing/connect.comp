@@ -32,7 +32,7 @@ vec3 offered_radiance(uint path, Offer offer, vec3 outgoing) {
     Offer rest = load_offer(path);
     if (IS_TEXTURED) {
         material = varied(
-            material, Surface(rest.reflectance, offer.alpha, offer.metallic, rest.anisotropy));
+            material, Surface(rest.reflectance, offer.alpha, offer.metallic, rest.anisotropy, 0.0));
     }
     Frame frame = frame_from_normal(offer.shading_normal);
     Reflector reflector = reflector_from(material, to_local(frame, outgoing));
@@ -51,9 +51,10 @@ void connect_path(uint path) {
     uint path_count = wave_path_count();
     FirstVertex first = load_first_vertex(path);
     if (wave.first_shadow_ray == 0u) {
-        hits[path] = Hit(
-            first.position, first.material, first.geometric_normal, 0.0, first.shading_normal,
-            NO_TRIANGLE);
+        hits[path].position = first.position;
+        hits[path].material = first.material;
+        hits[path].geometric_normal = first.geometric_normal;
+        hits[path].triangle = NO_TRIANGLE;
         seen[path] = uvec2(0u);
     }
     if (first.material == NO_MATERIAL) {

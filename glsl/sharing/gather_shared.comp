@@ -9,11 +9,12 @@
 #include "wave.glsl"
 
 READS(visibility)
-UPDATES(second_vertices)
+LOADS(SecondVertex, load_second_vertex, second_vertex_texels)
+UPDATES(second_lights)
 
 void gather_path(uint path) {
     uint path_count = wave_path_count();
-    SecondVertex second = second_vertices[path];
+    SecondVertex second = load_second_vertex(path);
     if (second.scale == 0.0) {
         return;
     }
@@ -23,6 +24,7 @@ void gather_path(uint path) {
     }
     Frame frame = frame_from_normal(second.shading_normal);
     Reflector reflector = reflector_from(material, to_local(frame, second.outgoing));
+    SecondLight light = second_lights[path];
     float per_ray = second.scale / float(max(wave.total_shadow_rays, 1u));
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         uint index = i * path_count + path;
@@ -30,11 +32,11 @@ void gather_path(uint path) {
         if (ray.contribution != vec3(0.0) && visibility[index] != 0u) {
             vec3 direction = wave.to_lamps != 0u ? normalize(ray.direction) : ray.direction;
             take_light(
-                second, direction, per_ray * ray.contribution,
+                light, direction, per_ray * ray.contribution,
                 brdf_evaluate(reflector, to_local(frame, direction)));
         }
     }
-    second_vertices[path] = second;
+    second_lights[path] = light;
 }
 
 RUN_PATHS(gather_path)

@@ -12,6 +12,7 @@
 
 UPDATES(paths)
 WRITES(second_vertices)
+WRITES(second_lights)
 
 void keep_second(uint path) {
     second_vertices[path].scale = 0.0;
@@ -20,8 +21,8 @@ void keep_second(uint path) {
         return;
     }
     FirstVertex first = load_first_vertex(path);
-    PathState state = paths[path];
-    float strongest = largest_of(state.throughput);
+    vec3 throughput = paths[path].throughput;
+    float strongest = largest_of(throughput);
     if (first.material == NO_MATERIAL || strongest <= 0.0) {
         return;
     }
@@ -39,14 +40,18 @@ void keep_second(uint path) {
     float u = random_independent_1d(index.pixel, index.sample_index, DIMENSION_OFFER, wave.seed);
     // The path has weighed its throughput by 1 / density: the ratio of the two densities.
     second_vertices[path] = SecondVertex(
-        hit.position, hit.geometric_normal, hit.shading_normal, -direction, state.throughput,
-        state.radiance, material.reflectance, material.alpha, material.ior, material.anisotropy,
-        hit.material, strongest, pdf * (strongest / most), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0),
-        vec3(0.0), vec3(0.0), 0.0, 0.0, u);
+        hit.position, hit.geometric_normal, hit.shading_normal, -direction, throughput,
+        paths[path].radiance, material.reflectance, material.alpha, material.ior, material.anisotropy,
+        hit.material, strongest, pdf * (strongest / most));
+    // All else is written before it is read.
+    second_lights[path].shared_light = vec3(0.0);
+    second_lights[path].bounce_value = vec3(0.0);
+    second_lights[path].weight_sum = 0.0;
+    second_lights[path].weight = 0.0;
+    second_lights[path].random_number = u;
     // As strong as before, so that roulette ends the path as often.
-    state.throughput = vec3(strongest);
-    state.radiance = vec3(0.0);
-    paths[path] = state;
+    paths[path].throughput = vec3(strongest);
+    paths[path].radiance = vec3(0.0);
 }
 
 RUN_PATHS(keep_second)

@@ -9,23 +9,27 @@
 #include "wave.glsl"
 
 UPDATES(paths)
-UPDATES(second_vertices)
+LOADS(SecondVertex, load_second_vertex, second_vertex_texels)
+WRITES(second_lights)
 
 void keep_third(uint path) {
-    SecondVertex second = second_vertices[path];
+    SecondVertex second = load_second_vertex(path);
     if (second.scale == 0.0) {
         return;
     }
     Material material = load_surface(path, second.material);
     Ray ray = load_ray(path);
-    if (ray.is_active != 0u && !is_diffuse(material)) {
+    vec3 direct = paths[path].radiance;
+    if (is_diffuse(material)) {
+        second_lights[path].shared_light = direct;
+    } else if (ray.is_active != 0u) {
         Frame frame = frame_from_normal(second.shading_normal);
         Reflector reflector = reflector_from(material, to_local(frame, second.outgoing));
-        second_vertices[path].bounce_direction = ray.direction;
-        second_vertices[path].bounce_value =
+        second_lights[path].bounce_direction = ray.direction;
+        second_lights[path].bounce_value =
             brdf_evaluate(reflector, to_local(frame, ray.direction));
     }
-    second_vertices[path].direct = paths[path].radiance;
+    second_lights[path].direct = direct;
     paths[path].radiance = vec3(0.0);
 }
 

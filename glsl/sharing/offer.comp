@@ -8,31 +8,30 @@
 #include "wave.glsl"
 
 READS(paths)
-UPDATES(second_vertices)
+LOADS(SecondVertex, load_second_vertex, second_vertex_texels)
+LOADS(SecondLight, load_second_light, second_light_texels)
 WRITES(offers)
 
 void offer_path(uint path) {
-    SecondVertex second = second_vertices[path];
+    SecondVertex second = load_second_vertex(path);
     offers[path].material = NO_MATERIAL;
     if (second.scale == 0.0) {
         return;
     }
+    SecondLight found = load_second_light(path);
     vec3 beyond = paths[path].radiance;
     vec3 light;
     if (is_diffuse(load_material(second.material))) {
-        second.shared_light = second.direct + beyond;
-        light = second.shared_light;
+        light = found.direct + beyond;
     } else {
-        take_light(second, second.bounce_direction, beyond, second.bounce_value);
-        light = second.weight > 0.0 ? second.arriving * (second.weight_sum / second.weight)
-                                    : vec3(0.0);
+        take_light(found, found.bounce_direction, beyond, found.bounce_value);
+        light = found.weight > 0.0 ? found.arriving * (found.weight_sum / found.weight) : vec3(0.0);
     }
-    second_vertices[path].shared_light = second.shared_light;
     if (light != vec3(0.0)) {
         offers[path] = Offer(
             second.position, second.material, second.geometric_normal, second.density_ratio,
             second.shading_normal, second.alpha, light / second.scale, second.metallic,
-            second.incident, second.reflectance, second.anisotropy);
+            found.incident, second.reflectance, second.anisotropy);
     }
 }
 

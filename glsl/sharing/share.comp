@@ -5,9 +5,11 @@
 
 #include "load.glsl"
 #include "sharing/cohort.glsl"
+#include "sharing/shared_part.glsl"
 #include "wave.glsl"
 
-READS(second_vertices)
+LOADS(SecondVertex, load_second_vertex, second_vertex_texels)
+LOADS(SecondLight, load_second_light, second_light_texels)
 READS(seen)
 TEXELS(connection_texels)
 TEXELS(offer_weight_texels)
@@ -17,15 +19,17 @@ void share_path(uint path) {
     uint path_count = wave_path_count();
     Cohort cohort = cohort_of(path);
     vec3 radiance = paths[path].radiance;
-    SecondVertex second = second_vertices[path];
+    SecondVertex second = load_second_vertex(path);
     if (second.scale > 0.0) {
         float own_weight = texelFetch(offer_weight_texels, int(path)).x;
-        vec3 light = second.direct + radiance;
+        SecondLight found = load_second_light(path);
+        vec3 light = found.direct + radiance;
         if (own_weight > 0.0) {
             float density =
                 texelFetch(connection_texels, int(cohort.member * path_count + path)).w;
             float share = own_weight * density / second.density_ratio;
-            light -= (1.0 - share) * second.shared_light;
+            vec3 shared_light = found.shared_light + shared_share(found.bounce_value) * radiance;
+            light -= (1.0 - share) * shared_light;
         }
         radiance = second.radiance + second.throughput * (light / second.scale);
     }

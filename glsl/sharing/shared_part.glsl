@@ -17,17 +17,17 @@ float shared_share(vec3 value) {
 
 // Counts light that a second vertex reflects from a direction by a BRDF of `value`, which is positive in
 // every channel that reflects at all, and may choose it for the other pixels.
-void take_light(inout SecondVertex second, vec3 direction, vec3 reflected, vec3 value) {
+void take_light(inout SecondLight light, vec3 direction, vec3 reflected, vec3 value) {
     vec3 shared_light = shared_share(value) * reflected;
     vec3 arriving = mix(vec3(0.0), reflected / value, greaterThan(value, vec3(0.0)));
-    second.shared_light += shared_light;
+    light.shared_light += shared_light;
     float weight = largest_of(shared_light) + BROAD_VALUE * largest_of(arriving);
-    Reservoir reservoir = Reservoir(second.weight_sum, second.weight, second.random_number);
+    Reservoir reservoir = Reservoir(light.weight_sum, light.weight, light.random_number);
     if (reservoir_takes(reservoir, weight, weight)) {
-        second.incident = direction;
-        second.arriving = arriving;
+        light.incident = direction;
+        light.arriving = arriving;
     }
-    second.weight_sum = reservoir.sum;
-    second.weight = reservoir.target;
-    second.random_number = reservoir.u;
+    light.weight_sum = reservoir.sum;
+    light.weight = reservoir.target;
+    light.random_number = reservoir.u;
 }

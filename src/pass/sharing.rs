@@ -17,7 +17,7 @@ use crate::{
         constants::{
             CONSTANT_COHORT_EDGE, MATERIAL_DIFFUSE, MATERIAL_DIFFUSE_TRANSMISSION, SPECULAR_KINDS,
         },
-        structs::{Connection, FirstVertex, Offer, SecondVertex, Wave},
+        structs::{Connection, FirstVertex, Offer, SecondLight, SecondVertex, Wave},
     },
 };
 
@@ -101,8 +101,8 @@ pub(crate) fn sharing_demand(demand: PathDemand, cohort_pixels: u32) -> PathDema
         return demand;
     }
     let connections = u64::from(cohort_pixels);
-    let vertex = size_of::<SecondVertex>().max(size_of::<Offer>());
-    let texels = size_of::<Offer>().max(size_of::<FirstVertex>()) / size_of::<[u32; 4]>();
+    let vertex = size_of::<SecondVertex>();
+    let texels = vertex / size_of::<[u32; 4]>();
     PathDemand {
         bytes: demand.bytes.max(vertex as u64).max(connections * size_of::<Connection>() as u64),
         texels: demand.texels.max(texels as u64).max(connections),
@@ -123,6 +123,7 @@ pub(crate) fn sharing_set(
     let bound = [
         (sharing::FIRST_VERTICES, make("first vertices", paths, size_of::<FirstVertex>())?),
         (sharing::SECOND_VERTICES, make("second vertices", paths, size_of::<SecondVertex>())?),
+        (sharing::SECOND_LIGHTS, make("second lights", paths, size_of::<SecondLight>())?),
         (sharing::OFFERS, make("offers", paths, size_of::<Offer>())?),
         (sharing::OFFER_WEIGHTS, make("offer weights", paths, size_of::<f32>())?),
         (sharing::CONNECTIONS, make("connections", connections, size_of::<Connection>())?),

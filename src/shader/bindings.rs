@@ -237,7 +237,9 @@ binding_tables! {
         /// First vertex of each path.
         FIRST_VERTICES: array FirstVertex, FIRST_VERTEX_TEXELS Rgba32Uint;
         /// Second vertex of each path.
-        SECOND_VERTICES: array SecondVertex;
+        SECOND_VERTICES: array SecondVertex, SECOND_VERTEX_TEXELS Rgba32Uint;
+        /// Light that the second vertex of each path has found.
+        SECOND_LIGHTS: array SecondLight, SECOND_LIGHT_TEXELS Rgba32Uint;
         /// Offer of each path to the pixels of its cohort.
         OFFERS: array Offer, OFFER_TEXELS Rgba32Uint;
         /// Weight of each offer.
@@ -261,7 +263,7 @@ binding_tables! {
         /// State of each path.
         PATHS: array PathState;
         /// Surface at the hit of each path, in scenes with textures.
-        HIT_SURFACES: array Surface;
+        HIT_SURFACES: array Surface, HIT_SURFACE_TEXELS Rgba32Uint;
         /// Instance that each path has hit, in scenes with instances.
         HIT_INSTANCES: array uint;
         /// Lengths of `PATH_LISTS` lists of paths, then the lists themselves: even and odd ones share a

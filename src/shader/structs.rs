@@ -165,6 +165,8 @@ structs! {
         metallic: float,
         /// [`Material::anisotropy`] there.
         anisotropy: vec2,
+        /// Zero; pads the last of two texels of four words.
+        reserved: float,
     }
 
     /// Layers of surfaces at the sample of a path.
@@ -301,9 +303,14 @@ structs! {
         scale: float,
         /// Density of the BRDF's sampling over that with which the path came here.
         density_ratio: float,
-        /// Direct light that it reflects, times `scale`.
+    }
+
+    /// Light that a second vertex has found.
+    struct SecondLight {
+        /// Direct light that it reflects, times [`SecondVertex::scale`].
         direct: vec3,
-        /// Light that the shared part of its BRDF reflects, times `scale`.
+        /// Light that the shared part of its BRDF reflects, times `scale`, but for that from beyond the next
+        /// ray.
         shared_light: vec3,
         /// Direction of the path's next ray.
         bounce_direction: vec3,
@@ -319,6 +326,8 @@ structs! {
         weight: float,
         /// Number in [0, 1) for the next choice.
         random_number: float,
+        /// Zero; pads the last of six texels of four words.
+        reserved: vec3,
     }
 
     /// Second vertex of a path as the other pixels of its cohort see it.
@@ -499,7 +508,7 @@ structs! {
         first_shadow_ray: uint,
         /// Shadow rays per hit over all dispatches.
         total_shadow_rays: uint,
-        /// Bits `AOV_…`: which extra film buffers are written.
+        /// Bits `AOV_…`: which extra film buffers are written. Shaders know them as `CONSTANT_AOVS`.
         aovs: uint,
         /// Step in film order from one pixel of the wave to the next; 0 counts as 1.
         pixel_stride: uint,
