@@ -120,29 +120,27 @@ struct GuideCell {
     uint found;
 };
 
-// Finds the cell for a place: the smallest part of the fine one, else the coarse one, else the face's.
+// Finds the cell for a place: the smallest part of the fine one, else the coarse one, else the face's. One
+// loop looks for all of them: compilers copy what is called at several places.
 GuideCell guide_cell(vec3 position, uint face, uint bits) {
     uint level = guide_level(position, bits);
     uint key = guide_key(position, face, level);
-    GuideCell cell = GuideCell(key, guide_find(key));
-    if (cell.found == GUIDE_NO_KEY) {
-        guide_note_missing(key);
-        cell.key = guide_coarse_key(key);
-        cell.found = guide_find(cell.key);
-        if (cell.found == GUIDE_NO_KEY) {
-            cell = GuideCell(GUIDE_NO_KEY, face);
-        }
-    }
-    bool has_parts = (cell.found & GUIDE_REFINED) != 0u;
-    while (has_parts && level > 0u) {
-        level--;
-        key = guide_key(position, face, level);
+    GuideCell cell = GuideCell(GUIDE_NO_KEY, face);
+    bool looks = true;
+    while (looks) {
         uint found = guide_find(key);
-        has_parts = found != GUIDE_NO_KEY && (found & GUIDE_REFINED) != 0u;
-        if (found == GUIDE_NO_KEY) {
-            guide_note_missing(key);
-        } else {
+        bool is_fine = (key & GUIDE_COARSE) == 0u;
+        if (found != GUIDE_NO_KEY) {
             cell = GuideCell(key, found);
+            looks = (found & GUIDE_REFINED) != 0u && level > 0u;
+            level = max(level, 1u) - 1u;
+            key = guide_key(position, face, level);
+        } else {
+            if (is_fine) {
+                guide_note_missing(key);
+            }
+            looks = is_fine && cell.key == GUIDE_NO_KEY;
+            key = guide_coarse_key(key);
         }
     }
     return cell;
