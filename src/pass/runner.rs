@@ -1,7 +1,7 @@
 //! Runs waves of paths over the film: records their passes, times them, and sizes the next wave.
 
 use std::{
-    collections::{BTreeMap, BTreeSet, btree_map::Entry},
+    collections::{BTreeMap, BTreeSet, VecDeque, btree_map::Entry},
     iter,
     ops::Range,
     sync::Arc,
@@ -26,7 +26,7 @@ use crate::{
     error::Result,
     gpu::{Commands, DescriptorSet, Device, MOST_INVOCATIONS, PassTimes},
     scene::Camera,
-    shader::structs::Wave,
+    shader::{spirv, structs::Wave},
 };
 
 /// Target range of a dispatch, milliseconds: safe from a desktop GPU's watchdog, yet long against
@@ -142,6 +142,19 @@ impl Runner {
         missing.retain(|Dispatch { kernel, .. }| {
             !self.passes.contains_key(kernel) && found.insert(kernel.clone())
         });
+        // After the first, which shows whether kernels are cached, long shaders come first and last:
+        // processes that compile from both ends meet at a short one.
+        let mut others = missing.split_off(missing.len().min(1));
+        others.sort_by_key(|dispatch| spirv::pass(dispatch.kernel.shader).len());
+        let mut order = VecDeque::new();
+        for dispatch in others {
+            if order.len().is_multiple_of(2) {
+                order.push_front(dispatch);
+            } else {
+                order.push_back(dispatch);
+            }
+        }
+        missing.extend(order);
         let start = Instant::now();
         let pass = |dispatch: &Dispatch| Pass::new(&self.device, dispatch.kernel.clone());
         let passes = missing.par_iter().with_max_len(1).map(pass).collect::<Result<Vec<_>>>()?;
