@@ -370,6 +370,25 @@ fn bright_and_dim_light_keep_their_colours() {
     }
 }
 
+/// Where nothing hides a grey sky, a ray brings the mean weight of its candidates, which draw numbers of
+/// their own: four times as many have a quarter of the variance, or less.
+#[test]
+fn candidates_of_a_ray_are_independent() {
+    let _alone = support::alone();
+    let grey = scenes::environment(64, |direction| Vec3::splat(1.0 + 8.0 * direction.x.powi(8)));
+    let scene = scenes::plane(Vec3::splat(0.5), grey);
+    for sampler in [Sampler::Ris, Sampler::ControlVariates] {
+        let variance = |candidates: u32| {
+            let parameters = Parameters { candidates: Some(candidates), ..Parameters::default() };
+            let settings = Settings { sampler, parameters, shadow_rays: 1, ..Settings::default() };
+            let sums = render(&scene, settings, 64);
+            (0..sums.pixel_count()).map(|pixel| sums.variance_of_mean(pixel)[1]).sum::<f64>()
+        };
+        let ratio = variance(2) / variance(8);
+        assert!(ratio > 3.2, "{}: {ratio}", sampler.name());
+    }
+}
+
 /// The same beside a wall that hides the brightest light: else `guided` samples as `mis` does.
 #[test]
 fn guided_keeps_colours_beside_a_wall() {
