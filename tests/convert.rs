@@ -92,6 +92,12 @@ fn images_keep_their_values() {
     run(&["bright.hdr", "--exposure", "-1"]);
     let hdr = image::open(folder.path().join("bright.hdr")).unwrap().into_rgb32f();
     assert!((hdr.get_pixel(0, 0).0[2] - 1.5).abs() < 0.01);
+    // The luminance 0.31 of the pixel becomes 0.18: 0.0582 of the red's 0.1, and a stop more if asked for.
+    for (stops, red) in [("0", 0.0582), ("1", 0.1164)] {
+        run(&["auto.exr", "--auto-exposure", "--exposure", stops, "--crop", "1,1,2,2"]);
+        let found = read("auto.exr").channels["R"][0];
+        assert!((found - red).abs() < 2e-4, "{found}, not {red}");
+    }
 }
 
 #[test]

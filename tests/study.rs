@@ -146,6 +146,10 @@ fn a_study_has_every_figure() {
         assert!(max > 0.0 && p999 <= max && last["relmse_trimmed"].as_f64() < Some(p999), "{last}");
         assert!(run["visible_share"].as_f64().unwrap() > 0.2);
         assert!(run["gpu_ms_per_sample"]["sample"].as_f64().unwrap() > 0.0);
+        let passes = run["gpu_ms_per_sample"].as_object().unwrap().values();
+        let per_sample: f64 = passes.map(|ms| ms.as_f64().unwrap()).sum();
+        let [seconds, spp] = ["gpu_seconds", "spp"].map(|name| last[name].as_f64().unwrap());
+        assert!((1e3 * seconds / (spp * per_sample) - 1.0).abs() < 1e-6, "{last}");
         if run["rule"]["spp"].is_number() {
             let counts: Vec<_> = measurements.iter().map(|m| m["spp"].as_u64().unwrap()).collect();
             assert_eq!(counts, [1, 2, 4, 6]);

@@ -468,6 +468,10 @@ fn films_inset_and_controls_have_their_places() {
     };
     // Bytes are alpha last, and grey but for the inset and the controls.
     let greys = |pixels: &[[u8; 4]]| pixels.iter().map(|pixel| pixel[1]).collect::<Vec<_>>();
+    let check = |found: &[u8], expected: &[u8]| {
+        let is_close = found.iter().zip(expected).all(|(one, other)| one.abs_diff(*other) <= 1);
+        assert!(is_close && found.len() == expected.len(), "{found:?}, not {expected:?}");
+    };
     let frame = WindowFrame {
         width: 6,
         height: 4,
@@ -498,15 +502,19 @@ fn films_inset_and_controls_have_their_places() {
         33, 30, 255, 2, 5, 33,
         33, 33, 33, 33, 33, 33,
     ];
-    let found = greys(&pixels);
-    let is_close = found.iter().zip(expected).all(|(one, other)| one.abs_diff(other) <= 1);
-    assert!(is_close, "{found:?}, not {expected:?}");
+    check(&greys(&pixels), &expected);
     assert_eq!(
         [pixels[0], pixels[15], pixels[16]],
         [[7, 8, 9, 255], [1, 2, 3, 255], [4, 5, 6, 255]]
     );
     let blue_first = composed(WindowFrame { is_bgra: 1, ..frame });
     assert_eq!([blue_first[0], blue_first[15]], [[9, 8, 7, 255], [3, 2, 1, 255]]);
+    // The films need not be of one height, and each has the rows of its own.
+    for is_reduced in [0, 1] {
+        let own = WindowFrame { is_reduced, film_height: 1, inset_height: 0, ..frame };
+        let found = greys(&composed(own));
+        check(&[&found[7..11], &found[13..17]].concat(), &[10, 255, 70, 80, 10, 255, 110, 120]);
+    }
     // Display values between 10 and 20, from the middle of one pixel to that of the next.
     let found = composed(WindowFrame {
         width: 8,
@@ -522,10 +530,7 @@ fn films_inset_and_controls_have_their_places() {
         overlay_width: 0,
         ..frame
     });
-    let found = greys(&found);
-    let expected = [10, 10, 11, 14, 16, 19, 20, 20];
-    let is_close = found.iter().zip(expected).all(|(one, other)| one.abs_diff(other) <= 1);
-    assert!(is_close, "{found:?}, not {expected:?}");
+    check(&greys(&found), &[10, 10, 11, 14, 16, 19, 20, 20]);
 }
 
 #[test]
