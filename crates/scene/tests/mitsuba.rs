@@ -393,20 +393,25 @@ fn models_become_materials() {
     );
     assert!(matches!(mixed.kind, MaterialKind::Dielectric { .. }));
     assert!(warnings[0].contains("lesser part of `blendbsdf`"), "{warnings:?}");
-    let (mixed, warnings) = material(
-        r#"<bsdf type="mixturebsdf"><string name="weights" value="0.5, 0.25, 0.25"/>
+    // Half 0.8, a quarter 0.4, and a quarter of all light; half 0.8, and half 0.82 of which half is metal.
+    let three = r#"<bsdf type="mixturebsdf"><string name="weights" value="0.5, 0.25, 0.25"/>
         <bsdf type="diffuse"><rgb name="reflectance" value="0.8"/></bsdf>
         <bsdf type="lambertian"><rgb name="reflectance" value="0.4"/></bsdf>
-        <bsdf type="mirror"/></bsdf>"#,
-    );
-    let MaterialKind::Principled(Principled { base_color, metallic, .. }) = mixed.kind else {
-        panic!()
-    };
-    // Half 0.8, a quarter 0.4, and a quarter of all light.
-    let reflected = base_color.x * (1.0 - metallic) * 0.96 + 0.04 * (1.0 - metallic);
-    let reflected = reflected + base_color.x * metallic;
-    assert!((reflected - 0.75).abs() < 0.02, "{base_color} {metallic}");
-    assert!(warnings[0].contains("gloss of `blendbsdf`"), "{warnings:?}");
+        <bsdf type="mirror"/></bsdf>"#;
+    let two = r#"<bsdf type="blendbsdf"><float name="weight" value="0.5"/>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0.8"/></bsdf>
+        <bsdf type="principled"><rgb name="base_color" value="0.8"/><float name="metallic" value="0.5"/>
+        </bsdf></bsdf>"#;
+    for (text, expected) in [(three, 0.75), (two, 0.81)] {
+        let (mixed, warnings) = material(text);
+        let MaterialKind::Principled(Principled { base_color, metallic, .. }) = mixed.kind else {
+            panic!()
+        };
+        let reflected = base_color.x * (1.0 - metallic) * 0.96 + 0.04 * (1.0 - metallic);
+        let reflected = reflected + base_color.x * metallic;
+        assert!((reflected - expected).abs() < 0.02, "{base_color} {metallic}");
+        assert!(warnings[0].contains("gloss of `blendbsdf`"), "{warnings:?}");
+    }
     let (phong, warnings) = material(
         r#"<bsdf type="phong"><float name="exponent" value="50"/>
         <rgb name="specularReflectance" value="0.1 0.05 0"/></bsdf>"#,

@@ -189,5 +189,8 @@ mod tests {
         // (1 + 1) / (0.5 + 1) of the visibility in the parent.
         assert!((found.regions[1].visibility - 2.0 / 3.0).abs() < 1e-6, "{found:?}");
         assert!((found.regions[3].visibility - 0.5).abs() < 1e-6, "{found:?}");
+        let own = |(visibility, response)| Estimate { visibility, response };
+        let two = Estimates::new([(0.5, 8.0), (0.25, 4.0)].map(own).into());
+        assert_eq!(two.reflected(&tables), 0.25 * (4.0 + 1.0));
     }
 }
