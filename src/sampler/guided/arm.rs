@@ -264,7 +264,8 @@ impl Arms {
     }
 
     /// Returns the arms that race with `arm`, itself first: other techniques in the first race, all that
-    /// differ by one setting in others. Later vertices as by `mis` teach nothing, so rays are half as many.
+    /// differ by one setting in others and in the open, which has one technique. Later vertices as by `mis`
+    /// teach nothing, so rays are half as many.
     pub(super) fn contenders(&self, is_first: bool, arm: Arm, is_open: bool) -> Vec<Arm> {
         let Arm { shares_paths, roulette_throughput, .. } = arm;
         let most = self.first(false).rays[0];
@@ -308,7 +309,7 @@ impl Arms {
             let is_next = place.is_some_and(|place| place.abs_diff(index) == 1);
             (is_next, Arm { candidates: *count, ..arm })
         });
-        let others = others.into_iter().chain(candidates).filter(|_| !is_first);
+        let others = others.into_iter().chain(candidates).filter(|_| !is_first || is_open);
         let free = techniques.into_iter().chain(others).filter(|(is_free, _)| *is_free);
         [arm].into_iter().chain(free.map(|(_, other)| other)).collect()
     }
