@@ -163,20 +163,21 @@ fn a_heatmap_is_written_into_a_new_folder() {
     folder.run(&["compare", "b.exr", "a.exr", "--heatmap", "new/folder/heat.png"]).assert(0, &[]);
     let png = fs::read(folder.path().join("new/folder/heat.png")).unwrap();
     assert_eq!(&png[..4], b"\x89PNG");
-    let color = |pictures: &[&str], high: &str| {
+    let map = |pictures: &[&str], high: &str| {
         let scale = ["--heatmap", "h.png", "--heatmap-high", high];
         folder.run(&[&["compare"], pictures, &scale].concat()).assert(0, &[]);
-        let map = image::open(folder.path().join("h.png")).unwrap().into_rgb8();
-        map.get_pixel(map.width() / 2, 0).0
+        image::open(folder.path().join("h.png")).unwrap().into_rgb8()
     };
     // Where one half of the reference is met, (x − r₁)(x − r₂) is no error, whatever the other says.
-    let met = color(&["b.exr", "a.exr", "--second-reference", "b.exr"], "1");
-    assert_eq!(met, color(&["b.exr", "b.exr"], "1"));
-    let near = color(&["b.exr", "a.exr"], "0.2");
-    assert_ne!(met, near);
-    // Colours are of errors, not of their squares.
+    let met = map(&["b.exr", "a.exr", "--second-reference", "b.exr"], "1");
+    assert_eq!(met, map(&["b.exr", "b.exr"], "1"));
+    assert_ne!(met, map(&["b.exr", "a.exr"], "1"));
+    // Colours are of errors, not of their squares: ten times as far, on ten times the scale.
     folder.write_image("far.exr", [8, 8], [2.0; 3]);
-    assert_eq!(near, color(&["far.exr", "a.exr"], "2"));
+    let color = |map: image::RgbImage| map.get_pixel(map.width() / 2, 0).0;
+    let near = color(map(&["b.exr", "a.exr"], "0.2"));
+    assert_ne!(near, color(met));
+    assert_eq!(near, color(map(&["far.exr", "a.exr"], "2")));
 }
 
 #[test]
