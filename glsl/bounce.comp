@@ -16,7 +16,7 @@ void bounce_path(uint path) {
     }
     PathIndex index = wave_path(path);
     Frame frame = frame_from_normal(hit.shading_normal);
-    vec3 outgoing_local = to_local(frame, -rays[path].direction);
+    vec3 outgoing_local = to_local(frame, -load_ray(path).direction);
     vec3 u = bounce_numbers(index, index.sample_index, wave.seed);
     vec3 direction;
     vec3 factor;

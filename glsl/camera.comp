@@ -40,7 +40,8 @@ void main() {
     }
 
     rays[path] = Ray(origin, index.inside ? 1u : 0u, normalize(direction), 0.0);
-    paths[path] = PathState(vec3(1.0), vec3(0.0), 0u, 0u, index.inside ? 1u : 0u);
+    paths[path] = PathState(
+        vec3(1.0), 0u, vec3(0.0), 0u, index.inside ? 1u : 0u, vec3(0.0));
     for (uint group = 0u; group < LIGHT_GROUPS; ++group) {
         group_radiance[group_place(path, group)] = vec3(0.0);
     }

@@ -2,9 +2,9 @@
 #version 460
 
 #include "light_groups.glsl"
+#include "load.glsl"
 #include "wave.glsl"
 
-READS(paths)
 READS(features)
 WRITES(film_radiance)
 UPDATES(film_unfiltered)
@@ -34,7 +34,7 @@ void deposit_pixel(uint pixel, PathIndex index) {
     uint dropped = 0u;
     uvec2 shadow_rays = uvec2(0u);
     for (uint i = 0u; i < wave.sample_count; ++i) {
-        PathState state = paths[i * wave.pixel_count + pixel];
+        PathState state = load_path_state(i * wave.pixel_count + pixel);
         bounce_rays += state.rays_traced - 1u;
         shadow_rays += uvec2(state.shadow_rays_visible, state.shadow_rays_traced);
         vec3 radiance = state.radiance;

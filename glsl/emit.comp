@@ -9,9 +9,8 @@
 #include "path_list.glsl"
 #include "wave.glsl"
 
-READS(lamp_clusters)
-READS(lamp_lists)
-UPDATES(paths)
+TEXELS(lamp_list_texels)
+WRITES(paths)
 
 void add_emission(uint path) {
     Hit hit = load_hit(path);
@@ -34,11 +33,12 @@ void add_emission(uint path) {
         float cosine = abs(dot(ray.direction, hit.geometric_normal));
         float density = surface.emission_density;
         if (HAS_LAMP_CELLS) {
-            density *= lamp_ratio(lamp_lists[path], lamp_clusters[hit.triangle]);
+            uint list = texelFetch(lamp_list_texels, int(path)).x;
+            density *= lamp_ratio(list, lamp_cluster(hit.triangle));
         }
         weight = pdf / (pdf + lamp_pdf(density, hit.distance, cosine));
     }
-    PathState state = paths[path];
+    PathState state = load_path_state(path);
     precise vec3 light = state.throughput * radiance * weight;
     paths[path].radiance = state.radiance + light;
     add_to_group(path, surface.light_group, light);

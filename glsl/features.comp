@@ -11,8 +11,6 @@
 #include "path_list.glsl"
 #include "wave.glsl"
 
-READS(hits)
-READS(paths)
 UPDATES(features)
 
 // Tests whether paths go on in a single direction of reflection, or of refraction.
@@ -21,7 +19,7 @@ bool is_perfectly_specular(Material material) {
 }
 
 void keep_features(uint path) {
-    Hit hit = hits[path];
+    Hit hit = load_hit(path);
     Ray ray = load_ray(path);
     Feature feature = Feature(vec3(0.0), 0u, vec3(0.0), hit.position);
     if (wave.vertex > 0u) {
@@ -35,7 +33,7 @@ void keep_features(uint path) {
         Frame frame = frame_from_normal(hit.shading_normal);
         Material material =
             load_surface(path, triangle_material(hit.triangle, load_hit_instance(path)));
-        feature.albedo = paths[path].throughput
+        feature.albedo = load_path_state(path).throughput
             * brdf_albedo(material, to_local(frame, -ray.direction));
         feature.normal = faceforward(hit.shading_normal, ray.direction, hit.geometric_normal);
         feature.is_open = is_perfectly_specular(material) ? 1u : 0u;

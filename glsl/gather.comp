@@ -10,9 +10,8 @@
 #include "path_list.glsl"
 #include "wave.glsl"
 
-READS(visibility)
-READS(lamp_groups)
-UPDATES(paths)
+TEXELS(lamp_group_texels)
+WRITES(paths)
 
 void gather_path(uint path) {
     uint path_count = wave_path_count();
@@ -29,14 +28,14 @@ void gather_path(uint path) {
             // Same test as in shadow.comp: rays without a contribution are not traced.
             bool is_traced = any(notEqual(contribution, vec3(0.0)));
             traced += is_traced ? 1u : 0u;
-            if (is_traced && visibility[ray] != 0u) {
+            if (is_traced && reaches_light(ray)) {
                 visible += 1u;
                 light += contribution;
             }
         }
         light /= float(max(wave.total_shadow_rays, 1u));
         if (LIGHT_GROUPS > 0u && wave.to_lamps != 0u) {
-            group = lamp_groups[path];
+            group = texelFetch(lamp_group_texels, int(path)).x;
         }
     } else {
         Ray ray = load_ray(path);
@@ -56,10 +55,11 @@ void gather_path(uint path) {
             weight = ray.brdf_pdf / all;
         }
     }
-    precise vec3 found = paths[path].throughput * light * weight;
-    paths[path].radiance += found;
-    paths[path].shadow_rays_traced += traced;
-    paths[path].shadow_rays_visible += visible;
+    PathState state = load_path_state(path);
+    precise vec3 found = state.throughput * light * weight;
+    paths[path].radiance = state.radiance + found;
+    paths[path].shadow_rays_traced = state.shadow_rays_traced + traced;
+    paths[path].shadow_rays_visible = state.shadow_rays_visible + visible;
     add_to_group(path, group, found);
 }
 

@@ -6,7 +6,6 @@
 #include "load.glsl"
 #include "wave.glsl"
 
-READS(hits)
 READS(triangle_objects)
 READS(instance_objects)
 READS(material_identifiers)
@@ -32,7 +31,7 @@ void count_mattes(uint pixel, PathIndex index) {
     uint first = MATTE_SLOTS * film_place(index);
     for (uint i = 0u; i < wave.sample_count; ++i) {
         uint path = i * wave.pixel_count + pixel;
-        uint triangle = hits[path].triangle;
+        uint triangle = load_hit(path).triangle;
         if (triangle == NO_TRIANGLE) {
             continue;
         }

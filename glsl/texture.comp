@@ -9,14 +9,14 @@
 #include "texture.glsl"
 #include "wave.glsl"
 
-UPDATES(hits)
+WRITES(hits)
 WRITES(hit_surfaces)
 
 // As SMALLEST_ALPHA of src/brdf/ggx.rs.
 const float SMALLEST_ALPHA = 1.0e-3;
 
 void read_textures(uint path) {
-    Hit hit = hits[path];
+    Hit hit = load_hit(path);
     if (hit.triangle == NO_TRIANGLE) {
         return;
     }

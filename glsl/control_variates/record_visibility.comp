@@ -7,7 +7,6 @@
 #include "path_list.glsl"
 #include "wave.glsl"
 
-READS(visibility)
 UPDATES(record_counts)
 
 void record_ray(ListedRay listed) {
@@ -19,7 +18,7 @@ void record_ray(ListedRay listed) {
     }
     uint entry = record_entry(record_of(hit.position, hit.geometric_normal), ray.direction);
     atomicAdd(record_counts[2u * entry], 1u);
-    if (visibility[listed.ray] != 0u) {
+    if (reaches_light(listed.ray)) {
         atomicAdd(record_counts[2u * entry + 1u], 1u);
     }
 }

@@ -13,7 +13,7 @@
 #include "vertex.glsl"
 
 TEXELS(record_visibilities)
-UPDATES(paths)
+WRITES(paths)
 
 // Candidates per shadow ray, half from the BRDF and half from the environment.
 layout(constant_id = CONSTANT_CANDIDATES) const uint CANDIDATES = 4u;
@@ -45,7 +45,7 @@ void sample_vertex(uint path, Vertex vertex) {
         write_ray(i * path_count + path, chosen.direction, contribution);
         rest += controlled_rest(chosen, CANDIDATES, contribution);
     }
-    PathState state = paths[path];
+    PathState state = load_path_state(path);
     precise vec3 light = state.throughput * (rest / float(wave.total_shadow_rays));
     paths[path].radiance = state.radiance + light;
     add_to_group(path, ENVIRONMENT_GROUP, light);

@@ -9,7 +9,8 @@
 #include "reservoir.glsl"
 
 TEXELS(guide_arriving)
-UPDATES(path_cells)
+LOADS(PathCell, load_path_cell, path_cell_texels)
+WRITES(path_cells)
 
 layout(constant_id = CONSTANT_BOUNCE_CANDIDATES) const uint BOUNCE_CANDIDATES = 4u;
 
@@ -25,7 +26,7 @@ void bounce_path(uint path) {
     // Start the sequences anew at each rebuild: the cells depend on earlier samples.
     uint number = index.sample_index - wave.epoch_start;
     Frame frame = frame_from_normal(hit.shading_normal);
-    vec3 outgoing_local = to_local(frame, -rays[path].direction);
+    vec3 outgoing_local = to_local(frame, -load_ray(path).direction);
     vec3 u = bounce_numbers(index, number, wave.epoch_seed);
     vec3 direction;
     vec3 factor;
@@ -37,7 +38,7 @@ void bounce_path(uint path) {
             index.pixel, number, vertex_dimension() + DIMENSION_RESAMPLING, wave.epoch_seed));
         // Rotate from candidate to candidate: each stays stratified over samples, all cover the BRDF.
         vec3 rotation = vec3(1.0 / float(BOUNCE_CANDIDATES), 0.618034, 0.754878);
-        uint first = path_cells[path].cell * GUIDE_ARRIVAL_SIDE * GUIDE_ARRIVAL_SIDE;
+        uint first = load_path_cell(path).cell * GUIDE_ARRIVAL_SIDE * GUIDE_ARRIVAL_SIDE;
         vec3 chosen = vec3(0.0, 0.0, 1.0);
         uint chosen_direction = 0u;
         for (uint c = 0u; c < BOUNCE_CANDIDATES; ++c) {

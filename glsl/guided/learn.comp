@@ -4,12 +4,12 @@
 #version 460
 
 #include "divide.glsl"
+#include "load.glsl"
 #include "path_list.glsl"
 #include "wave.glsl"
 
-READS(visibility)
 READS(guide)
-READS(learn_targets)
+TEXELS(learn_target_texels)
 UPDATES(guide_counts)
 UPDATES(guide_shares)
 
@@ -20,11 +20,11 @@ void learn_ray(ListedRay listed) {
     if (since_rebuild >= GUIDE_SAMPLES_THAT_ALL_TEACH && since_rebuild % GUIDE_TEACHING_STEP != 0u) {
         return;
     }
-    uvec2 target = learn_targets[ray];
+    uvec2 target = texelFetch(learn_target_texels, int(ray)).xy;
     if (target.x != NOTHING_TO_LEARN) {
         uint count = GUIDE_COUNT_WORDS * target.x;
         atomicAdd(guide_counts[count], 1u);
-        if (visibility[ray] != 0u) {
+        if (reaches_light(ray)) {
             atomicAdd(guide_counts[count + 1u], 1u);
             atomicAdd(guide_counts[count + 2u], target.y >> LEARN_RESPONSE_SHIFT);
             uint from_brdf = (target.y >> LEARN_FROM_BRDF_SHIFT) & NO_SHARE_TO_LEARN;

@@ -7,7 +7,7 @@
 #include "path_list.glsl"
 #include "wave.glsl"
 
-READS(path_cells)
+LOADS(PathCell, load_path_cell, path_cell_texels)
 TEXELS(guide_reflected)
 UPDATES(guide_arrivals)
 
@@ -17,7 +17,7 @@ void learn_arrival(uint path) {
     if (since_rebuild >= GUIDE_SAMPLES_THAT_ALL_TEACH && since_rebuild % GUIDE_TEACHING_STEP != 0u) {
         return;
     }
-    PathCell found = path_cells[path];
+    PathCell found = load_path_cell(path);
     // The light that comes from a specular surface is not known.
     if (found.teaches != NOTHING_TO_LEARN && found.cell != SPECULAR_CELL) {
         atomicAdd(guide_arrivals[2u * found.teaches], 1u);

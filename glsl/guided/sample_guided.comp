@@ -11,7 +11,7 @@
 #include "turns.glsl"
 
 WRITES(learn_targets)
-UPDATES(path_cells)
+WRITES(path_cells)
 
 // Offsets from the first dimension of a vertex, for independent numbers.
 const uint DIMENSION_GUIDE_TECHNIQUE = 6u;

@@ -12,7 +12,6 @@
 #include "wave.glsl"
 
 TEXELS(haar_centres)
-READS(visibility)
 UPDATES(haar_nodes)
 UPDATES(haar_cache)
 
@@ -50,7 +49,7 @@ void lower_path(uint path) {
     }
     // Rays without a contribution were not traced.
     ShadowRay ray = load_shadow_ray(path);
-    if (ray.contribution == vec3(0.0) || visibility[path] != 0u) {
+    if (ray.contribution == vec3(0.0) || reaches_light(path)) {
         return;
     }
     // Count the direction as the cache holds it.

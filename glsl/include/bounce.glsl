@@ -10,8 +10,8 @@
 #include "bvh.glsl"
 #include "specular.glsl"
 
-UPDATES(rays)
-UPDATES(paths)
+WRITES(rays)
+WRITES(paths)
 
 // First vertex at which russian roulette may end a path.
 layout(constant_id = CONSTANT_ROULETTE_VERTEX) const uint ROULETTE_VERTEX = 2u;
@@ -46,7 +46,8 @@ vec3 bounce_factor(
 bool follow_bounce(
     uint path, PathIndex index, Hit hit, vec3 direction, float brdf_pdf, vec3 factor, uint number,
     uint seed) {
-    vec3 throughput = paths[path].throughput * factor;
+    PathState state = load_path_state(path);
+    vec3 throughput = state.throughput * factor;
     float strongest = largest_of(throughput);
     if (wave.vertex + 1u >= ROULETTE_VERTEX && strongest > 0.0) {
         float survival = min(1.0, strongest / ROULETTE_THROUGHPUT);
@@ -57,7 +58,7 @@ bool follow_bounce(
     }
     bool alive = strongest > 0.0;
     paths[path].throughput = throughput;
-    paths[path].rays_traced += alive ? 1u : 0u;
+    paths[path].rays_traced = state.rays_traced + (alive ? 1u : 0u);
     rays[path] = Ray(
         offset_ray_origin(hit.position, hit.geometric_normal, direction), alive ? 1u : 0u,
         direction, brdf_pdf);
@@ -85,12 +86,12 @@ vec3 specular_factor(
     Scatter scattered;
     if (is_kind(material, MATERIAL_THIN_DIELECTRIC)) {
         // trace.comp has let the rest through, by the geometric normal.
-        float cosine = abs(dot(hit.geometric_normal, rays[path].direction));
+        float cosine = abs(dot(hit.geometric_normal, load_ray(path).direction));
         scattered = Scatter(
             vec3(-outgoing_local.xy, outgoing_local.z), pane_reflectance(material, cosine), false,
             0.0);
     } else {
-        bool is_behind = is_back(hit.triangle, load_hit_instance(path), rays[path].direction);
+        bool is_behind = is_back(hit.triangle, load_hit_instance(path), load_ray(path).direction);
         scattered = scatter(material, outgoing_local, is_behind, u);
         scattered.weight *= inside_transmittance(material, is_behind, hit.distance);
     }

@@ -2,8 +2,8 @@
 
 #include "instance.glsl"
 
-READS(hit_instances)
+TEXELS(hit_instance_texels)
 
 uint load_hit_instance(uint path) {
-    return HAS_INSTANCES ? hit_instances[path] : NO_INSTANCE;
+    return HAS_INSTANCES ? texelFetch(hit_instance_texels, int(path)).x : NO_INSTANCE;
 }

@@ -9,7 +9,7 @@
 #include "surfaces.glsl"
 
 TEXELS(instances)
-READS(triangle_materials)
+TEXELS(triangle_materials)
 
 vec4 instance_row(uint instance, uint row) {
     return uintBitsToFloat(texelFetch(instances, int(INSTANCE_TEXELS * instance + row)));
@@ -57,9 +57,14 @@ float instance_winding(uint instance) {
     return (instance_places(instance).w & INSTANCE_MIRRORS) != 0u ? -1.0 : 1.0;
 }
 
+// Material of a triangle as its mesh has it.
+uint mesh_material(uint triangle) {
+    return texelFetch(triangle_materials, int(triangle)).x;
+}
+
 // Material of a triangle: an instance may move the materials of its mesh, or replace all by one.
 uint triangle_material(uint triangle, uint instance) {
-    uint material = triangle_materials[triangle];
+    uint material = mesh_material(triangle);
     if (HAS_INSTANCES) {
         uvec4 places = instance_places(instance);
         return places.y + (material & places.z);

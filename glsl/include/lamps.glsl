@@ -8,10 +8,11 @@
 #include "parameters.glsl"
 #include "random.glsl"
 
-READS(lamp_cells)
-READS(lamp_choices)
-READS(lamp_entries)
-READS(lamps)
+TEXELS(lamp_cells)
+TEXELS(lamp_clusters)
+LOADS(LampChoice, load_lamp_choice, lamp_choice_texels)
+LOADS(LampEntry, load_lamp_entry, lamp_entry_texels)
+LOADS(Lamp, load_lamp, lamp_texels)
 
 struct LampSample {
     // From the surface to a point on the lamp, metres.
@@ -95,21 +96,27 @@ uint lamp_list(vec3 position, vec3 normal) {
     vec3 place = (position - parameters.lamp_grid_origin) * parameters.lamp_cells_per_metre;
     uvec3 size = parameters.lamp_grid_size;
     uvec3 cell = uvec3(clamp(place, vec3(0.0), vec3(size - 1u)));
-    return lamp_cells[((cell.z * size.y + cell.y) * size.x + cell.x) * 6u + cube_face(normal)];
+    uint place_of_cell = (cell.z * size.y + cell.y) * size.x + cell.x;
+    return texelFetch(lamp_cells, int(place_of_cell * 6u + cube_face(normal))).x;
 }
 
 // Last entry of a list whose cluster begins no later than at column `cluster`.
 LampEntry lamp_entry_of(uint list, uint cluster) {
     for (uint step = parameters.lamp_list_length >> 1u; step > 0u; step >>= 1u) {
-        list += lamp_entries[list + step].first <= cluster ? step : 0u;
+        list += load_lamp_entry(list + step).first <= cluster ? step : 0u;
     }
-    return lamp_entries[list];
+    return load_lamp_entry(list);
+}
+
+// Cluster of a placed triangle that emits.
+uint lamp_cluster(uint triangle) {
+    return texelFetch(lamp_clusters, int(triangle)).x;
 }
 
 // Probability of a lamp of a cluster over that by power alone, at the place of a list.
 float lamp_ratio(uint list, uint cluster) {
     LampEntry entry = lamp_entry_of(list, cluster);
-    return entry.first == cluster ? entry.ratio : lamp_entries[list].ratio;
+    return entry.first == cluster ? entry.ratio : load_lamp_entry(list).ratio;
 }
 
 // Draws an entry of a list.
@@ -117,9 +124,9 @@ LampEntry draw_lamp_entry(uint list, uint bits) {
     // The last number belongs to entries that fill the list up.
     bits = min(bits, 0xfffffffeu);
     for (uint step = parameters.lamp_list_length >> 1u; step > 0u; step >>= 1u) {
-        list += lamp_entries[list + step].before <= bits ? step : 0u;
+        list += load_lamp_entry(list + step).before <= bits ? step : 0u;
     }
-    return lamp_entries[list];
+    return load_lamp_entry(list);
 }
 
 // A lamp without a point on it.
@@ -133,15 +140,15 @@ struct DrawnLamp {
 DrawnLamp draw_lamp(uint list, uvec2 bits) {
     // Rounding of the products favours no column by more than lamp_count / 2^32.
     uint column = scaled(bits.x, parameters.lamp_count);
-    LampEntry entry = LampEntry(0u, 1.0, 0u, 0u, 1.0);
+    LampEntry entry = LampEntry(0u, 1.0, 0u, 0u, 1.0, vec3(0.0));
     if (HAS_LAMP_CELLS) {
         entry = draw_lamp_entry(list, bits.x);
         column = entry.first + scaled(bits.y, entry.count);
         bits.y *= entry.count;
     }
-    LampChoice choice = lamp_choices[column];
+    LampChoice choice = load_lamp_choice(column);
     if (bits.y >= choice.threshold) {
-        choice = lamp_choices[entry.first + choice.alias];
+        choice = load_lamp_choice(entry.first + choice.alias);
     }
     if (HAS_LAMP_CELLS && entry.first == 0u) {
         // Drawn among all lamps: its cluster may have an entry too.
@@ -158,7 +165,7 @@ LampSample sample_lamp(uint list, vec3 position, uvec2 bits, vec2 u) {
     DrawnLamp drawn = draw_lamp(list, bits);
     LampSample sampled;
     if ((drawn.source & LAMP_BIT) != 0u) {
-        sampled = sample_point_lamp(lamps[drawn.source & ~LAMP_BIT], position);
+        sampled = sample_point_lamp(load_lamp(drawn.source & ~LAMP_BIT), position);
         sampled.radiance_over_pdf /= drawn.probability;
     } else {
         sampled = sample_triangle_lamp(drawn.source, drawn.probability, position, u);
@@ -171,6 +178,6 @@ LampSample sample_lamp(uint list, vec3 position, uvec2 bits, vec2 u) {
 // Group of the light of a lamp or emitting triangle.
 uint light_group(uint source) {
     return (source & LAMP_BIT) != 0u
-        ? lamps[source & ~LAMP_BIT].light_group
-        : load_material_surface(triangle_materials[source]).light_group;
+        ? load_lamp(source & ~LAMP_BIT).light_group
+        : load_material_surface(mesh_material(source)).light_group;
 }

@@ -5,8 +5,7 @@
 #include "load.glsl"
 #include "wave.glsl"
 
-READS(visibility)
-UPDATES(paths)
+WRITES(paths)
 UPDATES(seen)
 
 void admit_path(uint path) {
@@ -21,15 +20,16 @@ void admit_path(uint path) {
         uint ray = i * path_count + path;
         vec3 contribution = load_shadow_ray(ray).contribution;
         traced += contribution != vec3(0.0) ? 1u : 0u;
-        if (contribution == vec3(1.0) && visibility[ray] != 0u) {
+        if (contribution == vec3(1.0) && reaches_light(ray)) {
             visible += 1u;
             bits |= 1u << i;
         }
     }
     uint first = wave.first_shadow_ray;
     seen[path] |= first < 32u ? uvec2(bits << first, 0u) : uvec2(0u, bits << (first - 32u));
-    paths[path].shadow_rays_traced += traced;
-    paths[path].shadow_rays_visible += visible;
+    PathState state = load_path_state(path);
+    paths[path].shadow_rays_traced = state.shadow_rays_traced + traced;
+    paths[path].shadow_rays_visible = state.shadow_rays_visible + visible;
 }
 
 RUN_PATHS(admit_path)

@@ -8,9 +8,9 @@
 #include "sharing/shared_part.glsl"
 #include "wave.glsl"
 
-READS(visibility)
 LOADS(SecondVertex, load_second_vertex, second_vertex_texels)
-UPDATES(second_lights)
+LOADS(SecondLight, load_second_light, second_light_texels)
+WRITES(second_lights)
 
 void gather_path(uint path) {
     uint path_count = wave_path_count();
@@ -24,12 +24,12 @@ void gather_path(uint path) {
     }
     Frame frame = frame_from_normal(second.shading_normal);
     Reflector reflector = reflector_from(material, to_local(frame, second.outgoing));
-    SecondLight light = second_lights[path];
+    SecondLight light = load_second_light(path);
     float per_ray = second.scale / float(max(wave.total_shadow_rays, 1u));
     for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
         uint index = i * path_count + path;
         ShadowRay ray = load_shadow_ray(index);
-        if (ray.contribution != vec3(0.0) && visibility[index] != 0u) {
+        if (ray.contribution != vec3(0.0) && reaches_light(index)) {
             vec3 direction = wave.to_lamps != 0u ? normalize(ray.direction) : ray.direction;
             take_light(
                 light, direction, per_ray * ray.contribution,

@@ -5,7 +5,6 @@
 #include "load.glsl"
 #include "wave.glsl"
 
-READS(paths)
 WRITES(first_vertices)
 
 void keep_first(uint path) {
@@ -17,7 +16,7 @@ void keep_first(uint path) {
     Material material = load_surface(path, hit.material);
     first_vertices[path] = FirstVertex(
         hit.position, hit.material, hit.geometric_normal, material.alpha, hit.shading_normal,
-        material.ior, -load_ray(path).direction, paths[path].throughput, material.reflectance,
+        material.ior, -load_ray(path).direction, load_path_state(path).throughput, material.reflectance,
         material.anisotropy, 0.0);
 }
 

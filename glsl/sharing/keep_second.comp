@@ -10,7 +10,7 @@
 #include "sharing/cohort.glsl"
 #include "wave.glsl"
 
-UPDATES(paths)
+WRITES(paths)
 WRITES(second_vertices)
 WRITES(second_lights)
 
@@ -21,8 +21,8 @@ void keep_second(uint path) {
         return;
     }
     FirstVertex first = load_first_vertex(path);
-    vec3 throughput = paths[path].throughput;
-    float strongest = largest_of(throughput);
+    PathState state = load_path_state(path);
+    float strongest = largest_of(state.throughput);
     if (first.material == NO_MATERIAL || strongest <= 0.0) {
         return;
     }
@@ -40,8 +40,8 @@ void keep_second(uint path) {
     float u = random_independent_1d(index.pixel, index.sample_index, DIMENSION_OFFER, wave.seed);
     // The path has weighed its throughput by 1 / density: the ratio of the two densities.
     second_vertices[path] = SecondVertex(
-        hit.position, hit.geometric_normal, hit.shading_normal, -direction, throughput,
-        paths[path].radiance, material.reflectance, material.alpha, material.ior, material.anisotropy,
+        hit.position, hit.geometric_normal, hit.shading_normal, -direction, state.throughput,
+        state.radiance, material.reflectance, material.alpha, material.ior, material.anisotropy,
         hit.material, strongest, pdf * (strongest / most));
     // All else is written before it is read.
     second_lights[path].shared_light = vec3(0.0);

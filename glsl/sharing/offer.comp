@@ -7,7 +7,6 @@
 #include "sharing/shared_part.glsl"
 #include "wave.glsl"
 
-READS(paths)
 LOADS(SecondVertex, load_second_vertex, second_vertex_texels)
 LOADS(SecondLight, load_second_light, second_light_texels)
 WRITES(offers)
@@ -19,7 +18,7 @@ void offer_path(uint path) {
         return;
     }
     SecondLight found = load_second_light(path);
-    vec3 beyond = paths[path].radiance;
+    vec3 beyond = load_path_state(path).radiance;
     vec3 light;
     if (is_diffuse(load_material(second.material))) {
         light = found.direct + beyond;

@@ -10,15 +10,15 @@
 
 LOADS(SecondVertex, load_second_vertex, second_vertex_texels)
 LOADS(SecondLight, load_second_light, second_light_texels)
-READS(seen)
+TEXELS(seen_texels)
 TEXELS(connection_texels)
 TEXELS(offer_weight_texels)
-UPDATES(paths)
+WRITES(paths)
 
 void share_path(uint path) {
     uint path_count = wave_path_count();
     Cohort cohort = cohort_of(path);
-    vec3 radiance = paths[path].radiance;
+    vec3 radiance = load_path_state(path).radiance;
     SecondVertex second = load_second_vertex(path);
     if (second.scale > 0.0) {
         float own_weight = texelFetch(offer_weight_texels, int(path)).x;
@@ -33,7 +33,7 @@ void share_path(uint path) {
         }
         radiance = second.radiance + second.throughput * (light / second.scale);
     }
-    uvec2 seen_by_path = seen[path];
+    uvec2 seen_by_path = texelFetch(seen_texels, int(path)).xy;
     if (seen_by_path != uvec2(0u)) {
         for (uint member = 0u; member < COHORT_PIXELS; ++member) {
             float weight =

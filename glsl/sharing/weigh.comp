@@ -7,7 +7,7 @@
 #include "sharing/cohort.glsl"
 #include "wave.glsl"
 
-READS(offers)
+LOADS(Offer, load_offer, offer_texels)
 TEXELS(connection_texels)
 TEXELS(seen_texels)
 WRITES(offer_weights)
@@ -15,7 +15,7 @@ WRITES(offer_weights)
 void weigh_path(uint path) {
     uint path_count = wave_path_count();
     float weight = 0.0;
-    if (offers[path].material != NO_MATERIAL) {
+    if (load_offer(path).material != NO_MATERIAL) {
         Cohort cohort = cohort_of(path);
         bool is_own_seen = false;
         float density = 0.0;
@@ -27,7 +27,7 @@ void weigh_path(uint path) {
                     texelFetch(connection_texels, int(cohort.member * path_count + other)).w;
             }
         }
-        weight = is_own_seen ? offers[path].density_ratio / density : 0.0;
+        weight = is_own_seen ? load_offer(path).density_ratio / density : 0.0;
     }
     offer_weights[path] = weight;
 }

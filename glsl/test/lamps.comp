@@ -4,8 +4,6 @@
 #include "lamps.glsl"
 #include "test/answers.glsl"
 
-READS(lamp_clusters)
-
 struct LampQuery {
     vec3 position;
     vec3 normal;
@@ -27,8 +25,8 @@ LampAnswer answer(LampQuery query) {
         corners[corner] = uintBitsToFloat(triangle_texel(drawn.source, corner).xyz);
     }
     float area = 0.5 * length(cross(corners[1] - corners[0], corners[2] - corners[0]));
-    MaterialSurface surface = load_material_surface(triangle_materials[drawn.source]);
-    float ratio = lamp_ratio(list, lamp_clusters[drawn.source]);
+    MaterialSurface surface = load_material_surface(mesh_material(drawn.source));
+    float ratio = lamp_ratio(list, lamp_cluster(drawn.source));
     return LampAnswer(drawn.source, drawn.probability, surface.emission_density * ratio * area);
 }
 

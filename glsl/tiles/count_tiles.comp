@@ -7,7 +7,6 @@
 #include "tiles/sectors.glsl"
 #include "wave.glsl"
 
-READS(visibility)
 UPDATES(tile_counts)
 
 void count_ray(ListedRay listed) {
@@ -19,7 +18,7 @@ void count_ray(ListedRay listed) {
     uint entry = sector_of(hit.position) * TILES + tile_of(ray.direction);
     atomicAdd(tile_counts[2u * entry], 1u);
     // Same test as in shadow.comp: rays without a contribution are not traced.
-    if (ray.contribution != vec3(0.0) && visibility[listed.ray] != 0u) {
+    if (ray.contribution != vec3(0.0) && reaches_light(listed.ray)) {
         float cosine = max(dot(hit.geometric_normal, ray.direction), 0.0);
         atomicAdd(
             tile_counts[2u * entry + 1u], uint(cosine * cosine * float(TILE_RESPONSE_UNITS) + 0.5));

@@ -54,7 +54,7 @@ impl GeometryBuffers {
             })
             .collect::<Result<_>>()?;
         let materials =
-            Buffer::from_slice(device, "triangle materials", &accel.triangle_materials)?;
+            Buffer::texels_from_slice(device, "triangle materials", &accel.triangle_materials)?;
         let mut bound = vec![
             (scene::BVH_NODES, Buffer::texels_from_slice(device, "BVH nodes", &accel.nodes)?),
             (scene::TRIANGLE_MATERIALS, materials),

@@ -152,7 +152,7 @@ impl LampTables {
                 alias: entry.alias,
                 source: sources[member as usize].source,
                 probability: (drawn * share) as f32,
-                cluster: 0,
+                ..structs::LampChoice::default()
             }
         });
         self.choices.extend(choices);
@@ -297,6 +297,7 @@ fn convert(lamp: &Lamp, groups: &LightGroups) -> structs::Lamp {
                 inner,
                 outer,
                 light_group,
+                ..structs::Lamp::default()
             }
         }
         LampKind::Directional { direction, irradiance } => structs::Lamp {

@@ -140,6 +140,7 @@ impl SceneBuffers {
             ..parameters(scene, map, total, window)
         };
         let words = |name, words: &[u32]| Buffer::from_slice(device, name, words);
+        let texels_of_words = |name, words: &[u32]| Buffer::texels_from_slice(device, name, words);
         let mut bound = vec![
             (bindings::PARAMETERS, Buffer::from_slice(device, "parameters", &[parameters])?),
             (bindings::ENVIRONMENT_TEXELS, texels),
@@ -147,14 +148,17 @@ impl SceneBuffers {
             (bindings::ENVIRONMENT_CELLS, cells),
             (bindings::COMPENSATED_ROWS, compensated_rows),
             (bindings::COMPENSATED_CELLS, compensated_cells),
-            (bindings::LAMP_CHOICES, Buffer::from_slice(device, "lamp choices", &lamps.choices)?),
-            (bindings::LAMPS, Buffer::from_slice(device, "lamps", &lamps.lamps)?),
-            (bindings::LAMP_CELLS, words("lamp cells", &lamp_cells.lists)?),
             (
-                bindings::LAMP_ENTRIES,
-                Buffer::from_slice(device, "lamp entries", &lamp_cells.entries)?,
+                bindings::LAMP_CHOICE_TEXELS,
+                Buffer::texels_from_slice(device, "lamp choices", &lamps.choices)?,
             ),
-            (bindings::LAMP_CLUSTERS, words("lamp clusters", &lamps.triangle_clusters)?),
+            (bindings::LAMP_TEXELS, Buffer::texels_from_slice(device, "lamps", &lamps.lamps)?),
+            (bindings::LAMP_CELLS, texels_of_words("lamp cells", &lamp_cells.lists)?),
+            (
+                bindings::LAMP_ENTRY_TEXELS,
+                Buffer::texels_from_slice(device, "lamp entries", &lamp_cells.entries)?,
+            ),
+            (bindings::LAMP_CLUSTERS, texels_of_words("lamp clusters", &lamps.triangle_clusters)?),
             (bindings::TRIANGLE_OBJECTS, words("triangle objects", &mattes.triangle_objects)?),
             (bindings::INSTANCE_OBJECTS, words("instance objects", &mattes.instance_objects)?),
             (bindings::MATERIAL_IDENTIFIERS, words("material identifiers", &mattes.materials)?),

@@ -176,7 +176,7 @@ binding_tables! {
         /// Fourth page of triangles.
         TRIANGLES_3: texels Rgba32Uint;
         /// Material index of each triangle in BVH order.
-        TRIANGLE_MATERIALS: array uint;
+        TRIANGLE_MATERIALS: texels R32Uint;
         /// Materials.
         MATERIALS: array Material, MATERIAL_TEXELS Rgba32Uint;
         /// Words of the BRDF tables, addressed by offsets in the materials; as texels, cells of four halves.
@@ -187,14 +187,14 @@ binding_tables! {
         ENVIRONMENT_ROWS: texels R32Float;
         /// Cumulative probability over the cells of each row.
         ENVIRONMENT_CELLS: texels R32Float;
-        /// Alias table over lamps and emitting triangles.
-        LAMP_CHOICES: array LampChoice;
-        /// Lights without a surface.
-        LAMPS: array Lamp;
+        /// Alias table over lamps and emitting triangles, a `LampChoice` of two texels each.
+        LAMP_CHOICE_TEXELS: texels Rgba32Uint;
+        /// Lights without a surface, a `Lamp` of four texels each.
+        LAMP_TEXELS: texels Rgba32Uint;
         /// First entry of the list of each cell and cube face.
-        LAMP_CELLS: array uint;
-        /// Lists of lamps.
-        LAMP_ENTRIES: array LampEntry;
+        LAMP_CELLS: texels R32Uint;
+        /// Lists of lamps, a `LampEntry` of two texels each.
+        LAMP_ENTRY_TEXELS: texels Rgba32Uint;
         /// `environment_rows` of the compensated density.
         COMPENSATED_ROWS: texels R32Float;
         /// `environment_cells` of the compensated density.
@@ -223,7 +223,7 @@ binding_tables! {
         /// Instances in the order of the upper level of the tree, eight texels each.
         INSTANCES: texels Rgba32Uint;
         /// Cluster of each placed triangle that emits.
-        LAMP_CLUSTERS: array uint;
+        LAMP_CLUSTERS: texels R32Uint;
         /// Cryptomatte's identifier of the object of each triangle in BVH order, where it is placed.
         TRIANGLE_OBJECTS: array uint;
         /// That of the object of each instance, in the order of the scene.
@@ -259,25 +259,25 @@ binding_tables! {
         /// Shadow rays: direction `k` of path `i` at `k · path_count + i`.
         SHADOW_RAYS: array ShadowRay, SHADOW_RAY_TEXELS Rg32Uint;
         /// One where a shadow ray reaches the light, else zero.
-        VISIBILITY: array uint;
+        VISIBILITY: array uint, VISIBILITY_TEXELS R32Uint;
         /// State of each path.
-        PATHS: array PathState;
+        PATHS: array PathState, PATH_TEXELS Rgba32Uint;
         /// Surface at the hit of each path, in scenes with textures.
         HIT_SURFACES: array Surface, HIT_SURFACE_TEXELS Rgba32Uint;
         /// Instance that each path has hit, in scenes with instances.
-        HIT_INSTANCES: array uint;
+        HIT_INSTANCES: array uint, HIT_INSTANCE_TEXELS R32Uint;
         /// Lengths of `PATH_LISTS` lists of paths, then the lists themselves: even and odd ones share a
         /// place each.
         PATH_LISTS: array uint, PATH_LIST_TEXELS R32Uint;
         /// First entry of the list that lamps were drawn from at the last vertex of each path.
-        LAMP_LISTS: array uint;
+        LAMP_LISTS: array uint, LAMP_LIST_TEXELS R32Uint;
         /// Layers of surfaces of each path, where they are asked for.
         FEATURES: array Feature;
         /// Radiance of each path by groups of lights, where they are asked for: that of group `g` of path `i`
         /// at `g · path_count + i`.
         GROUP_RADIANCE: array vec3;
         /// Group of the lamp of each path's last shadow ray to one, where groups are asked for.
-        LAMP_GROUPS: array uint;
+        LAMP_GROUPS: array uint, LAMP_GROUP_TEXELS R32Uint;
     }
 
     /// Set 1 of the passes that show films in a window.

@@ -197,6 +197,8 @@ structs! {
         outer: float,
         /// Group of its light.
         light_group: uint,
+        /// Zero; pads the last of four texels of four words.
+        reserved: vec3,
     }
 
     /// Column of the alias table over lamps and emitting triangles.
@@ -211,6 +213,8 @@ structs! {
         probability: float,
         /// First column of the table of its cluster.
         cluster: uint,
+        /// Zero; pads the last of two texels of four words.
+        reserved: vec3,
     }
 
     /// Entry of a list of lamps: the first stands for all lamps, the others for clusters, by `first`.
@@ -225,6 +229,8 @@ structs! {
         count: uint,
         /// Factor on the weight of a candidate.
         visibility: float,
+        /// Zero; pads the last of two texels of four words.
+        reserved: vec3,
     }
 
     /// Direction sampled at a hit, with its contribution if the environment is visible there.
@@ -239,14 +245,16 @@ structs! {
     struct PathState {
         /// Product of BRDF · cosine / pdf along the path.
         throughput: vec3,
-        /// Radiance gathered so far.
-        radiance: vec3,
         /// Traced shadow rays of this path; directions without a contribution are not traced.
         shadow_rays_traced: uint,
+        /// Radiance gathered so far.
+        radiance: vec3,
         /// Shadow rays of this path that reached the environment.
         shadow_rays_visible: uint,
         /// Camera and bounce rays of this path.
         rays_traced: uint,
+        /// Zero; pads the last of three texels of four words.
+        reserved: vec3,
     }
 
     /// First vertex of a path, to be connected with the second vertices of its cohort.

@@ -537,6 +537,7 @@ fn list_of(
         first: 0,
         count: tables.source_count,
         visibility: LEAST_VISIBILITY.powf(VISIBILITY_EXPONENT),
+        ..LampEntry::default()
     });
     let (mut before, mut weight) = (end, 0.0);
     for (number, estimate) in estimates.iter().enumerate() {
@@ -552,6 +553,7 @@ fn list_of(
             first: columns.start,
             count: columns.end - columns.start,
             visibility: estimate.visibility,
+            ..LampEntry::default()
         });
         before = end.min(u64::from(u32::MAX));
     }

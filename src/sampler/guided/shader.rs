@@ -97,9 +97,9 @@ room! {
         GUIDE_MISSING: array uint;
         /// Count of each shadow ray, or `NOTHING_TO_LEARN`; octave of light, c p_B / q in 256ths
         /// (from bit `LEARN_FROM_BRDF_SHIFT`), response (from bit `LEARN_RESPONSE_SHIFT`).
-        LEARN_TARGETS: array uvec2;
+        LEARN_TARGETS: array uvec2, LEARN_TARGET_TEXELS Rg32Uint;
         /// Current cell of each path, and the cell and direction that its bounce ray teaches.
-        PATH_CELLS: array PathCell;
+        PATH_CELLS: array PathCell, PATH_CELL_TEXELS Rg32Uint;
         /// Learned light from other surfaces by cell and direction, relative to the cell's mean.
         GUIDE_ARRIVING: texels R32Float;
         /// Learned light that each cell reflects, in whole units.
