@@ -65,6 +65,7 @@ void sample_vertex(uint path, Vertex vertex) {
     uint dimension = DIMENSION_LAMP + wave.vertex * DIMENSIONS_PER_LAMP_VERTEX
         + wave.first_shadow_ray * DIMENSIONS_PER_LAMP_RAY;
     uint strata = LAMP_CANDIDATES * wave.total_shadow_rays;
+    uint width = stratum_width(strata);
     uint list = 0u;
     if (HAS_LAMP_CELLS) {
         list = lamp_list(hit.position, is_inside ? -hit.geometric_normal : hit.geometric_normal);
@@ -79,7 +80,8 @@ void sample_vertex(uint path, Vertex vertex) {
     for (uint c = 0u; c < LAMP_CANDIDATES; ++c) {
         uint own = dimension + 1u + 2u * c;
         uvec2 bits = random_bits_2d(vertex.index.pixel, number, own, wave.seed);
-        bits.x = stratified(bits.x, c * wave.total_shadow_rays + wave.first_shadow_ray, strata);
+        uint stratum = c * wave.total_shadow_rays + wave.first_shadow_ray;
+        bits.x = stratified(bits.x, stratum, strata, width);
         vec2 u = random_2d(vertex.index.pixel, number, own + 1u, wave.seed);
         bool is_far = is_glass && (!has_both || bits.x >= 0x80000000u);
         bits.x <<= has_both ? 1u : 0u;

@@ -3,6 +3,7 @@
 //
 // A pass reads only tables from earlier passes, so no density changes while it runs.
 
+#include "divide.glsl"
 #include "regions.glsl"
 #include "vertex.glsl"
 
@@ -53,8 +54,10 @@ uint guide_level(vec3 position, uint bits) {
 // Returns the key of the fine cell around a place. Cells nest in those of the next level.
 uint guide_key(vec3 position, uint face, uint level) {
     float edge = guide.finest_edge * uintBitsToFloat((level + 127u) << 23u);
-    ivec3 place = ivec3(floor((position - guide.grid_origin) / edge)) & 255;
-    return uint(place.x) | (uint(place.y) << 8u) | (uint(place.z) << 16u) | (level << 24u)
+    vec3 place = floor((position - guide.grid_origin) / edge);
+    place -= 256.0 * floor(place / 256.0);
+    ivec3 cell = ivec3(whole(place.x), whole(place.y), whole(place.z)) & 255;
+    return uint(cell.x) | (uint(cell.y) << 8u) | (uint(cell.z) << 16u) | (level << 24u)
         | (face << 28u);
 }
 

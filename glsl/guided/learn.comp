@@ -29,7 +29,7 @@ void learn_ray(ListedRay listed) {
             atomicAdd(guide_counts[count + 2u], target.y >> LEARN_RESPONSE_SHIFT);
             uint from_brdf = (target.y >> LEARN_FROM_BRDF_SHIFT) & NO_SHARE_TO_LEARN;
             if (from_brdf != NO_SHARE_TO_LEARN) {
-                uint cell = target.x / guide.region_count;
+                uint cell = divide(target.x, guide.region_count).x;
                 uint octave = cell * GUIDE_SHARE_OCTAVES
                     + (target.y & ((1u << LEARN_FROM_BRDF_SHIFT) - 1u));
                 atomicAdd(guide_shares[2u * octave], 1u);

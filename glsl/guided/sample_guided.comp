@@ -53,8 +53,8 @@ void finish(uint index, uint first, Guided guided, float factor, uint from_brdf)
     // change of sin(theta) within a row.
     float light = guided.sampled.environment_pdf * parameters.environment_total * 2.0 * PI * PI;
     float response = light > 0.0 ? luminance(guided.sampled.integrand) / light : 0.0;
-    uint response_units = uint(clamp(
-        response * float(GUIDE_RESPONSE_UNITS) + 0.5, 1.0, float(GUIDE_RESPONSE_MOST)));
+    uint response_units = uint(whole(clamp(
+        response * float(GUIDE_RESPONSE_UNITS) + 0.5, 1.0, float(GUIDE_RESPONSE_MOST))));
     bool teaches =
         contribution != vec3(0.0) || (CANDIDATES == 1u && wave.vertex == 0u);
     learn_targets[index] = uvec2(
@@ -67,7 +67,8 @@ void finish(uint index, uint first, Guided guided, float factor, uint from_brdf)
 void finish_one(uint index, uint first, Guided guided, float share) {
     float pdf = share * guided.sampled.brdf_pdf + (1.0 - share) * guided_pdf(guided);
     float factor = pdf > 0.0 ? 1.0 / pdf : 0.0;
-    uint from_brdf = uint(256.0 * min(share * guided.sampled.brdf_pdf * factor, 1.0) + 0.5);
+    uint from_brdf =
+        uint(whole(256.0 * min(share * guided.sampled.brdf_pdf * factor, 1.0) + 0.5));
     finish(index, first, guided, factor, from_brdf);
 }
 

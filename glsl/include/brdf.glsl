@@ -6,6 +6,7 @@
 // directions. Both are 0 unless both directions are above the surface, and for mirrors, dielectrics and
 // thin panes: see specular.glsl.
 
+#include "divide.glsl"
 #include "frame.glsl"
 #include "fresnel.glsl"
 #include "ggx.glsl"
@@ -50,7 +51,7 @@ float table_value(uint index) {
 // Interpolates linearly between equally spaced nodes over the cosine 0…1, `stride` words apart.
 float cosine_table(uint offset, uint stride, float cosine) {
     float position = clamp(cosine, 0.0, 1.0) * float(BRDF_COSINE_INTERVALS);
-    uint node = min(uint(position), BRDF_COSINE_INTERVALS - 1u);
+    uint node = min(uint(whole(position)), BRDF_COSINE_INTERVALS - 1u);
     uint index = offset + node * stride;
     return mix(table_value(index), table_value(index + stride), position - float(node));
 }
@@ -73,7 +74,7 @@ vec3 sample_uniform_hemisphere(vec2 u) {
 // materials share.
 vec2 ggx_schlick_albedo(uint table_offset, float alpha, float cosine) {
     float position = clamp(sqrt(alpha), 0.0, 1.0) * float(GGX_ROUGHNESS_INTERVALS);
-    uint row = min(uint(position), GGX_ROUGHNESS_INTERVALS - 1u);
+    uint row = min(uint(whole(position)), GGX_ROUGHNESS_INTERVALS - 1u);
     float fraction = position - float(row);
     uint lower = table_offset + row * GGX_ROUGHNESS_WORDS;
     uint upper = lower + GGX_ROUGHNESS_WORDS;
@@ -164,7 +165,7 @@ struct Between {
 // Bins around a position, in bins; the ends are held.
 Between held_bins(float position, uint count) {
     position = clamp(position - 0.5, 0.0, float(count - 1u));
-    uint lower = uint(position);
+    uint lower = uint(whole(position));
     return Between(uvec2(lower, min(lower + 1u, count - 1u)), position - float(lower));
 }
 
@@ -174,7 +175,7 @@ Between closed_bins(float position, uint count) {
     if (position < 0.0) {
         position += float(count);
     }
-    uint lower = min(uint(position), count - 1u);
+    uint lower = min(uint(whole(position)), count - 1u);
     return Between(
         uvec2(lower, lower + 1u == count ? 0u : lower + 1u), position - float(lower));
 }
@@ -255,7 +256,7 @@ vec3 measured_turn(uint table_offset, vec3 angles, vec3 half_vector, vec2 axis) 
 // Bin of the outgoing polar angle in the sampling table.
 uint measured_elevation_bin(vec3 outgoing_local) {
     float theta = atan(length(outgoing_local.xy), outgoing_local.z);
-    return min(uint(theta * (2.0 / PI) * float(MEASURED_ELEVATION_BINS)),
+    return min(uint(whole(theta * (2.0 / PI) * float(MEASURED_ELEVATION_BINS))),
         MEASURED_ELEVATION_BINS - 1u);
 }
 
@@ -327,14 +328,14 @@ float measured_pdf(Reflector reflector, vec3 incident_local, float theta_half) {
     uint elevation = reflector.elevation;
     float cosine_share = reflector.share;
     uint polar = min(
-        uint(float(MEASURED_POLAR_BINS) * sqrt(theta_half * (2.0 / PI))),
+        uint(whole(float(MEASURED_POLAR_BINS) * sqrt(theta_half * (2.0 / PI)))),
         MEASURED_POLAR_BINS - 1u);
     vec2 axis = measured_azimuth_axis(reflector.outgoing_local);
     float y = abs(axis.x * half_vector.y - axis.y * half_vector.x);
     float x = dot(axis, half_vector.xy);
     float phi = (x == 0.0 && y == 0.0) ? 0.0 : atan(y, x);
     uint azimuth = min(
-        uint(float(MEASURED_AZIMUTH_BINS) * phi / PI), MEASURED_AZIMUTH_BINS - 1u);
+        uint(whole(float(MEASURED_AZIMUTH_BINS) * phi / PI)), MEASURED_AZIMUTH_BINS - 1u);
     float density = table_value(table_offset + MEASURED_DENSITY_OFFSET
         + elevation * MEASURED_SAMPLING_CELLS + polar * MEASURED_AZIMUTH_BINS + azimuth);
     // dω_h/dω_i = 1/(4 ω_o·h), and ω_o·h is half the length of the half vector.

@@ -5,6 +5,7 @@
 // row's polar angle, then a guide to the probabilities. environment_cells: cumulative probability
 // over the width cells of each row, then a guide. crates/scene/src/environment/table.rs describes both.
 
+#include "divide.glsl"
 #include "frame.glsl"
 #include "layout.glsl"
 #include "parameters.glsl"
@@ -109,9 +110,9 @@ EnvironmentLocation environment_locate(vec3 direction) {
     int height = int(parameters.environment_height);
     float x = uv.x * float(width) - 0.5;
     float y = uv.y * float(height) + 0.5;
-    int column = int(floor(x));
+    int column = whole(x);
     column = column < 0 ? width - 1 : min(column, width - 1);
-    int row = clamp(int(floor(y)), 0, height);
+    int row = clamp(whole(y), 0, height);
     return EnvironmentLocation(uint(column), uint(row), vec2(x - floor(x), y - floor(y)));
 }
 
@@ -138,7 +139,7 @@ float environment_pdf(vec3 direction, vec4 light) {
     float height = float(parameters.environment_height);
     float sin_theta = sqrt(direction.x * direction.x + direction.z * direction.z);
     float v = atan(sin_theta, direction.y) / PI;
-    uint row = min(uint(v * height + 0.5), parameters.environment_height);
+    uint row = min(uint(whole(v * height + 0.5)), parameters.environment_height);
     float mean_sine = environment_row(parameters.environment_height + 1u + row);
     return environment_weight(light) * mean_sine
         / (total * 2.0 * PI * PI * max(sin_theta, ENVIRONMENT_MIN_SIN_THETA));
@@ -216,9 +217,9 @@ EnvironmentSample environment_sample(vec2 u) {
     // Find the first row, then the first cell, whose cumulative probability exceeds u: never an
     // empty one. The guides bound the search.
     uint row_guide = 2u * (height + 1u);
-    uint interval = uint(u.y * float(guide_size(height + 1u)));
-    uint row = uint(environment_row(row_guide + interval));
-    uint last = uint(environment_row(row_guide + interval + 1u));
+    uint interval = uint(whole(u.y * float(guide_size(height + 1u))));
+    uint row = uint(whole(environment_row(row_guide + interval)));
+    uint last = uint(whole(environment_row(row_guide + interval + 1u)));
     FIND_FIRST(row, last, environment_row(middle) > u.y)
     float before = row > 0u ? environment_row(row - 1u) : 0.0;
     float row_remainder =
@@ -226,9 +227,9 @@ EnvironmentSample environment_sample(vec2 u) {
 
     uint guide = guide_size(width);
     uint first_cell = row * (width + guide + 1u);
-    interval = first_cell + width + uint(u.x * float(guide));
-    uint column = uint(environment_cell_value(interval));
-    last = uint(environment_cell_value(interval + 1u));
+    interval = first_cell + width + uint(whole(u.x * float(guide)));
+    uint column = uint(whole(environment_cell_value(interval)));
+    last = uint(whole(environment_cell_value(interval + 1u)));
     FIND_FIRST(column, last, environment_cell_value(first_cell + middle) > u.x)
     before = column > 0u ? environment_cell_value(first_cell + column - 1u) : 0.0;
     float column_remainder = min(

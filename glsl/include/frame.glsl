@@ -5,6 +5,8 @@
 // mapping takes unit directions to the unit square; its Jacobian is 2 pi^2 sin(theta), with theta
 // measured from +Y.
 
+#include "divide.glsl"
+
 const float PI = 3.14159265358979;
 
 struct Frame {
@@ -71,9 +73,9 @@ vec2 sin_cos_pi(float x) {
     float s = ((-1.9515295891e-4 * z + 8.3321608736e-3) * z - 1.6666654611e-1) * z * angle + angle;
     float c = ((2.443315711809948e-5 * z - 1.388731625493765e-3) * z + 4.166664568298827e-2) * z * z
         - 0.5 * z + 1.0;
-    uint quadrant = uint(quarter_turns) & 3u;
-    vec2 turned = (quadrant & 1u) == 0u ? vec2(s, c) : vec2(c, -s);
-    return (quadrant & 2u) == 0u ? turned : -turned;
+    int quadrant = whole(quarter_turns);
+    vec2 turned = (quadrant & 1) == 0 ? vec2(s, c) : vec2(c, -s);
+    return (quadrant & 2) == 0 ? turned : -turned;
 }
 
 // Lat-long coordinates of a direction: u = 0.5 + atan2(x, -z) / 2 pi, 0.5 at the poles; v = theta /

@@ -3,6 +3,7 @@
 // src/pass/lamps.rs and lamp_cells for the densities.
 
 #include "bvh.glsl"
+#include "divide.glsl"
 #include "emission.glsl"
 #include "frame.glsl"
 #include "parameters.glsl"
@@ -95,7 +96,8 @@ LampSample sample_triangle_lamp(uint triangle, float probability, vec3 position,
 uint lamp_list(vec3 position, vec3 normal) {
     vec3 place = (position - parameters.lamp_grid_origin) * parameters.lamp_cells_per_metre;
     uvec3 size = parameters.lamp_grid_size;
-    uvec3 cell = uvec3(clamp(place, vec3(0.0), vec3(size - 1u)));
+    place = clamp(place, vec3(0.0), vec3(size - 1u));
+    uvec3 cell = uvec3(whole(place.x), whole(place.y), whole(place.z));
     uint place_of_cell = (cell.z * size.y + cell.y) * size.x + cell.x;
     return texelFetch(lamp_cells, int(place_of_cell * 6u + cube_face(normal))).x;
 }

@@ -6,6 +6,8 @@
 // where nothing depends on earlier samples. random_independent_2d is not: use it where past
 // outcomes enter.
 
+#include "divide.glsl"
+
 // PCG4D. [Jarzynski & Olano 2020].
 uvec4 hash_4d(uvec4 v) {
     v = v * 1664525u + 1013904223u;
@@ -56,12 +58,16 @@ uint scaled(uint bits, uint count) {
     return high;
 }
 
-// Moves uniform bits into one of `strata` equal parts of their range: floor(2^32 (stratum + u) / strata)
-// for u = bits / 2^32, to one unit. `strata` is at most 2^16.
-uint stratified(uint bits, uint stratum, uint strata) {
-    uint width = 0xffffffffu / strata;
-    uint rest = 0xffffffffu % strata + 1u;
-    return stratum * width + stratum * rest / strata + bits / strata;
+// Whole part of the width of one of `strata` equal parts of the range of bits; at most 2^16 of them.
+uint stratum_width(uint strata) {
+    return 0xffffffffu / strata;
+}
+
+// Moves uniform bits into one of the parts, which are `width` wide: 2^32 (stratum + u) / strata for
+// u = bits / 2^32, to two units. Without divisions, which software devices do lane by lane.
+uint stratified(uint bits, uint stratum, uint strata, uint width) {
+    float rest = float(0u - width * strata) / float(strata);
+    return stratum * width + uint(whole(float(stratum) * rest)) + scaled(bits, width);
 }
 
 const uint RANDOM_KEY_TAG = 0x9e3779b9u;

@@ -1,6 +1,7 @@
 // Cells of rectangles of the environment, drawn in proportion to their light. Twin of
 // tests/twin/regions.rs.
 
+#include "divide.glsl"
 #include "environment.glsl"
 #include "random.glsl"
 
@@ -12,12 +13,8 @@ uvec2 region_cell(usamplerBuffer aliases, uvec4 region, uint place, uint keep) {
     uint chosen = scaled(place, count);
     uvec2 alias = texelFetch(aliases, int(region.x + chosen)).xy;
     chosen = keep < alias.x ? chosen : alias.y;
-    // Divide chosen by columns without an integer division.
-    uint row = uint(float(chosen) / float(region.y));
-    int column = int(chosen) - int(row * region.y);
-    row = column < 0 ? row - 1u : (column >= int(region.y) ? row + 1u : row);
-    column += column < 0 ? int(region.y) : (column >= int(region.y) ? -int(region.y) : 0);
-    return uvec2((region.w & 0xffffu) + uint(column), (region.w >> 16u) + row);
+    uvec2 place_in_region = divide(chosen, region.y);
+    return uvec2(region.w & 0xffffu, region.w >> 16u) + place_in_region.yx;
 }
 
 // Draws a cell of a region by `place`, and a direction from its bilinear patch by other bits.

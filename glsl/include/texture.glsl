@@ -5,6 +5,7 @@
 // filter averages anyway once samples add up, and so blur the picture: a bias that no number of
 // samples removes.
 
+#include "divide.glsl"
 #include "bvh.glsl"
 #include "ggx.glsl"
 #include "layout.glsl"
@@ -81,7 +82,7 @@ vec4 texture_lookup(TextureUse used, vec2 image) {
         texture_place(image.x, wrap_u, used.width), texture_place(image.y, wrap_v, used.height));
     bool is_nearest = (used.flags & TEXTURE_NEAREST) != 0u;
     place -= is_nearest ? 0.0 : 0.5;
-    ivec2 low = ivec2(floor(place));
+    ivec2 low = ivec2(whole(place.x), whole(place.y));
     vec2 share = place - floor(place);
     // A loop, since compilers copy the decoding of a texel into each place that calls it. Differences from
     // the first texel are exactly 0 where all are alike: opaque stays opaque.
