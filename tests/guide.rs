@@ -5,7 +5,7 @@
 use fenestra::{
     math::random::{hash_4d, random_independent_2d},
     sampler::guided::{
-        ARRIVAL_DIRECTIONS, CellKey, Guide, PARTS_PER_RAY, decode_entry, decode_visibility,
+        ARRIVAL_DIRECTIONS, CellKey, Guide, PARTS_PER_RAY, decode_entry, decode_visibility, ratios,
     },
     sampler::regions::{FACE_COUNT, PARENT_COUNT, Partition, Rectangle, Region},
     scene::environment::{EnvironmentMap, EnvironmentTables},
@@ -267,11 +267,9 @@ fn entries_hold_the_probabilities_they_are_drawn_with() {
     let regions = partition.regions.len();
     for cell in [0, FACE_COUNT, guide.cell_count() - 1] {
         let entries = &snapshot.entries[cell * regions..][..regions];
-        let expected: Vec<f64> = entries
-            .iter()
-            .zip(&partition.regions)
-            .map(|(entry, region)| f64::from(decode_entry(*entry).0) * region.share)
-            .collect();
+        let shares = || partition.regions.iter().map(|region| region.share);
+        let expected: Vec<f64> =
+            ratios(entries, shares()).zip(shares()).map(|(ratio, share)| ratio * share).collect();
         assert!((expected.iter().sum::<f64>() - 1.0).abs() < 1e-6);
         let mut observed = vec![0.0; regions];
         for sample in 0..200_000 {
@@ -280,23 +278,24 @@ fn entries_hold_the_probabilities_they_are_drawn_with() {
         }
         let p = chi_square_p_value(&observed, &expected);
         assert!(p > 1e-5, "cell {cell}: p = {p}");
-        for (entry, region) in entries.iter().zip(&partition.regions) {
-            let (ratio, .., weight) = decode_entry(*entry);
-            assert_eq!(ratio > 0.0, region.share > 0.0, "every region with energy can be drawn");
+        for (entry, probability) in entries.iter().zip(&expected) {
+            let weight = decode_entry(*entry).2;
+            // An entry that begins where the next one does would stand for all.
+            assert!(*probability < 1.0, "every region with energy can be drawn");
             assert!((7e-4..=1.0).contains(&weight));
         }
     }
 }
 
 /// Region that `bits` choose among the entries of a cell; twin of `draw_guided`.
-fn choose_region(entries: &[[u32; 2]], bits: u32) -> usize {
-    let start = |interval: usize| decode_entry(entries[interval]).2 as usize;
+fn choose_region(entries: &[u32], bits: u32) -> usize {
+    let start = |interval: usize| decode_entry(entries[interval]).1 as usize;
     let interval = ((u64::from(bits) * entries.len() as u64) >> 32) as usize;
     let mut low = if interval == 0 { 0 } else { start(interval) };
     let mut high = start((interval + 1) % entries.len());
     while low < high {
         let middle = (low + high).div_ceil(2);
-        if decode_entry(entries[middle]).1 <= bits >> 16 {
+        if decode_entry(entries[middle]).0 <= bits >> 16 {
             low = middle;
         } else {
             high = middle - 1;
@@ -339,11 +338,11 @@ fn cells_learn_and_fall_back_on_their_surroundings() {
     let share_east = |key: CellKey| -> f64 {
         let slot = snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
         let entries = &snapshot.entries[slot[1] as usize * regions..][..regions];
-        entries
-            .iter()
+        let shares = partition.regions.iter().map(|region| region.share);
+        ratios(entries, shares)
             .zip(&partition.regions)
             .filter(|(_, region)| region.direction.x > 0.0)
-            .map(|(entry, region)| f64::from(decode_entry(*entry).0) * region.share)
+            .map(|(ratio, region)| ratio * region.share)
             .sum()
     };
     let prior: f64 = partition
@@ -393,8 +392,9 @@ fn cells_learn_what_their_surfaces_reflect() {
         let snapshot = guide.snapshot(&partition);
         let slot = snapshot.table.iter().find(|entry| entry[0] == key.0).unwrap();
         let entries = &snapshot.entries[slot[1] as usize * regions..][..regions];
-        let density = |index: usize| f64::from(decode_entry(entries[index]).0);
-        density(strong) / density(weak)
+        let shares = partition.regions.iter().map(|region| region.share);
+        let densities: Vec<f64> = ratios(entries, shares).collect();
+        densities[strong] / densities[weak]
     };
     // The defensive share ignores the counts and lowers the ratio a little.
     assert!((8.0..10.5).contains(&ratio(cell)), "{}", ratio(cell));
@@ -519,7 +519,7 @@ fn overflow_and_collisions_fall_back() {
     crowded.add_cells(&missing);
     let snapshot = crowded.snapshot(&partition);
     assert!(snapshot.table.iter().all(|entry| entry[0] != GUIDE_NO_KEY), "16 slots are full");
-    assert_eq!(snapshot.entries.len(), crowded.cell_count() * partition.regions.len());
+    assert_eq!(snapshot.entries.len(), crowded.cell_count() * partition.regions.len() + 1);
 }
 
 #[test]

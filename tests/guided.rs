@@ -107,8 +107,8 @@ fn places_that_share_a_key_are_unbiased() {
     let mut teacher = support::renderer(&scene, guided(1));
     teacher.render_pass(4).unwrap();
     let taught = teacher.guide_state().unwrap().unwrap();
-    // Each of 256 regions takes two words to read and those to count; the shares come on top.
-    let cell_bytes = 256 * (8 + 4 * u64::from(GUIDE_COUNT_WORDS)) + 4 * SHARE_WORDS as u64;
+    // Each of 256 regions takes a word to read and those to count; the shares come on top.
+    let cell_bytes = 256 * (4 + 4 * u64::from(GUIDE_COUNT_WORDS)) + 4 * SHARE_WORDS as u64;
     for (name, edge, memory, candidates, samples) in [
         ("huge cells", 1e3, 1 << 27, 1, 32),
         ("huge cells", 1e3, 1 << 27, 4, 32),

@@ -24,20 +24,25 @@ const uint DIMENSION_GUIDE_CELL = 5u;
 struct GuideEntry {
     // Probability of the region over its share of the map's energy: density relative to the whole map.
     float ratio;
-    // Cumulative probability of the regions before this one, in 65,536ths.
-    uint before;
-    // First region reaching into interval `index` of region_count equal ones; at 0 the last region
-    // to draw.
-    uint start;
     // Factor on the weight of a candidate in this region, by its visibility.
     float visibility;
 };
 
-GuideEntry guide_entry(uint index) {
-    uvec2 words = texelFetch(guide_entries, int(index)).xy;
-    float level = float(words.y >> 26u);
+// Word of a region in a cell: cumulative probability of the regions before it, in 65,536ths; from bit 16 on
+// the first region that reaches into the interval of its index among region_count equal ones, at index 0 the
+// last region to draw; from bit 26 on the level of its visibility.
+uint guide_word(uint index) {
+    return texelFetch(guide_entries, int(index)).x;
+}
+
+GuideEntry guide_entry(uint index, uvec4 region) {
+    uint word = guide_word(index);
+    // That of the next region, or of the first one of the next cell, which is 0. Only regions without energy
+    // have no probability, and their factor is 0.
+    uint part = ((guide_word(index + 1u) - word - 1u) & 0xffffu) + 1u;
+    float level = float(word >> 26u);
     return GuideEntry(
-        uintBitsToFloat(words.x), words.y & 0xffffu, (words.y >> 16u) & 0x3ffu,
+        float(part) * (1.0 / 65536.0) * uintBitsToFloat(region.z),
         exp2(-level * (10.5 / float(GUIDE_VISIBILITY_LEVELS - 1u))));
 }
 
@@ -166,10 +171,6 @@ struct Guided {
     GuideEntry entry;
 };
 
-uint guide_word(uint index) {
-    return texelFetch(guide_entries, int(index)).y;
-}
-
 // Draws a region from the cell's cumulative probabilities by bits.x, a texel cell from the region's
 // alias table by bits.y, and a direction from the bilinear patch. The guide cell's entries begin at
 // `first`. Regions close in the map are mostly close in order, which keeps the strata.
@@ -189,9 +190,8 @@ Guided draw_guided(Vertex vertex, uint first, uvec2 bits, uvec4 more_bits) {
         }
     }
     guided.region = low;
-    guided.entry = guide_entry(first + guided.region);
-
     uvec4 region = texelFetch(guide_regions, int(guided.region));
+    guided.entry = guide_entry(first + guided.region, region);
     guided.sampled =
         evaluate_light(vertex, region_sample(guide_aliases, region, bits.y, more_bits));
     return guided;
@@ -202,7 +202,8 @@ Guided locate_guided(uint first, DirectionSample sampled) {
     guided.sampled = sampled;
     guided.region =
         texelFetch(guide_region_of_cell, environment_cell_index(sampled.direction)).x;
-    guided.entry = guide_entry(first + guided.region);
+    guided.entry =
+        guide_entry(first + guided.region, texelFetch(guide_regions, int(guided.region)));
     return guided;
 }
 

@@ -142,7 +142,7 @@ void sample_path(uint path) {
         for (uint i = 0u; i < wave.shadow_ray_count; ++i) {
             uvec2 bits = epoch_bits(vertex, first_ray + i, DIMENSION_GUIDE_RESAMPLING);
             Guided none = Guided(
-                DirectionSample(vec3(0.0), vec3(0.0), 0.0, 0.0), 0u, GuideEntry(0.0, 0u, 0u, 0.0));
+                DirectionSample(vec3(0.0), vec3(0.0), 0.0, 0.0), 0u, GuideEntry(0.0, 0.0));
             Resampled ray = Resampled(
                 none, 0.0, 0.0, 0.0, 0.0, 0.0, unit_float(bits.x) < UNGUIDED_CHOICE,
                 reservoir_start(unit_float(bits.y)));

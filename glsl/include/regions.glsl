@@ -6,14 +6,13 @@
 #include "random.glsl"
 
 // Column and row of a cell of the environment, from the alias table of a region: `place` chooses an entry,
-// `keep` its own cell or its alias. The region is first alias entry, columns, rows, first row * 65,536 +
-// first column.
+// `keep` its own cell or its alias. The region is as in Partition::tables.
 uvec2 region_cell(usamplerBuffer aliases, uvec4 region, uint place, uint keep) {
-    uint count = region.y * region.z;
-    uint chosen = scaled(place, count);
+    uint columns = region.y & 0xffffu;
+    uint chosen = scaled(place, columns * (region.y >> 16u));
     uvec2 alias = texelFetch(aliases, int(region.x + chosen)).xy;
     chosen = keep < alias.x ? chosen : alias.y;
-    uvec2 place_in_region = divide(chosen, region.y);
+    uvec2 place_in_region = divide(chosen, columns);
     return uvec2(region.w & 0xffffu, region.w >> 16u) + place_in_region.yx;
 }
 

@@ -9,8 +9,9 @@ use super::{
     PARTS_PER_RAY, SHARE_WORDS, Snapshot,
     budget::GuideBudget,
     cell_readback::{CellReadback, RegionReadback},
-    decode_entry, decode_visibility,
+    decode_visibility,
     parameters::GuidedParameters,
+    ratios,
 };
 use crate::{
     error::{Error, Result},
@@ -29,7 +30,7 @@ const CELL_PIXELS: f32 = 24.0;
 const LEVELS: i32 = 12;
 const COUNT_BYTES: u64 = 4 * GUIDE_COUNT_WORDS as u64;
 /// Bytes of a cell per region: an entry to read and counts to write.
-const BYTES_PER_REGION: u64 = 8 + COUNT_BYTES;
+const BYTES_PER_REGION: u64 = 4 + COUNT_BYTES;
 const ARRIVAL_BYTES: u64 = size_of::<ArrivalWords>() as u64;
 /// Bytes of a cell that knows arriving light: by direction the light and two counted words, and its
 /// reflected light.
@@ -120,7 +121,7 @@ impl GuideBuffers {
         let (mut regions, aliases) = partition.tables();
         regions.resize(most_regions.max(region_count), [0; 4]);
         let (entry_bytes, count_bytes) =
-            (8 * budget.counts as u64, COUNT_BYTES * budget.counts as u64);
+            (4 * (budget.counts as u64 + 1), COUNT_BYTES * budget.counts as u64);
         let guide = guide_parameters(scene, region_count, slots, missing_slots);
         let origin = Origin {
             environment: scene::environment_hash(scene),
@@ -242,7 +243,7 @@ impl GuideBuffers {
             self.learned.refine();
         }
         if splits || count > now {
-            let importance = self.learned.region_importance(&self.snapshot);
+            let importance = self.learned.region_importance(&self.partition, &self.snapshot);
             if let Some(partition) = self.partition.split_by(&importance, count) {
                 let capacity = self.budget.cells(partition.regions.len());
                 self.learned.carry_over(&self.partition, &partition, capacity);
@@ -266,15 +267,18 @@ impl GuideBuffers {
     pub fn cell(&self, index: usize) -> Result<CellReadback> {
         let key = Some(self.learned.keys()[index]).filter(|_| index >= FACE_COUNT);
         let count = self.partition.regions.len();
-        let known =
-            self.snapshot.entries[index * count..][..count].iter().zip(&self.partition.regions);
+        let entries = &self.snapshot.entries[index * count..][..count];
+        let shares = || self.partition.regions.iter().map(|region| region.share);
+        let known = entries.iter().zip(ratios(entries, shares())).zip(shares());
         let rays = |parts: u32| f64::from(parts) / f64::from(PARTS_PER_RAY);
         let regions =
-            known.zip(self.learned.counts(index)).map(|((entry, region), count)| RegionReadback {
-                trials: rays(count.trials),
-                hits: rays(count.hits),
-                visibility: decode_visibility(*entry),
-                probability: f64::from(decode_entry(*entry).0) * region.share,
+            known.zip(self.learned.counts(index)).map(|(((entry, ratio), share), count)| {
+                RegionReadback {
+                    trials: rays(count.trials),
+                    hits: rays(count.hits),
+                    visibility: decode_visibility(*entry),
+                    probability: ratio * share,
+                }
             });
         let face = key.map_or(index, CellKey::face);
         Ok(CellReadback { key, face, regions: regions.collect() })

@@ -4,10 +4,7 @@
 //! share that follows the energy alone.
 
 use crate::{
-    sampler::{
-        guided::estimate::Estimates,
-        regions::{Partition, Region},
-    },
+    sampler::{guided::estimate::Estimates, regions::Partition},
     shader::rooms::guided::GUIDE_VISIBILITY_LEVELS,
 };
 
@@ -31,8 +28,6 @@ const TARGET_RANGE: f32 = 10.5;
 pub struct EntryTables {
     /// Share of the energy of every region.
     shares: Vec<f64>,
-    /// One over [`REGION_SCALE`], divided by the share of the energy of every region.
-    inverse_shares: Vec<f32>,
     /// V̂ to the power of [`VISIBILITY_EXPONENT`] and the level of the weight of a candidate, by
     /// [`power_index`].
     powers: Vec<(f32, u32)>,
@@ -46,10 +41,6 @@ fn power_index(visibility: f32) -> usize {
 
 impl EntryTables {
     pub fn new(partition: &Partition) -> Self {
-        let inverse = |region: &Region| {
-            let inverse = 1.0 / (f64::from(REGION_SCALE) * region.share);
-            if region.share > 0.0 { (inverse as f32).min(f32::MAX) } else { 0.0 }
-        };
         let first = MIN_VISIBILITY.to_bits() >> 17;
         let steps = (GUIDE_VISIBILITY_LEVELS - 1) as f32;
         let power = |index: u32| {
@@ -61,7 +52,6 @@ impl EntryTables {
         };
         Self {
             shares: partition.regions.iter().map(|region| region.share).collect(),
-            inverse_shares: partition.regions.iter().map(inverse).collect(),
             powers: (0..=power_index(1.0) as u32).map(power).collect(),
         }
     }
@@ -82,8 +72,8 @@ impl<'a> EntryWriter<'a> {
         Self { tables, weights, levels, parts, starts }
     }
 
-    /// Writes the entries of a cell, one per region; see [`decode_entry`].
-    pub fn write(&mut self, estimates: &Estimates, entries: &mut [[u32; 2]]) {
+    /// Writes the entries of a cell, one per region: `guide_word` of `glsl/guided/guide.glsl`.
+    pub fn write(&mut self, estimates: &Estimates, entries: &mut [u32]) {
         let Self { tables, weights, levels, parts, starts } = self;
         weights.clear();
         levels.clear();
@@ -99,12 +89,11 @@ impl<'a> EntryWriter<'a> {
         quantise(weights, parts);
         interval_starts(parts, starts);
         let mut before = 0;
-        for ((((entry, part), inverse), level), start) in
-            entries.iter_mut().zip(parts).zip(&tables.inverse_shares).zip(levels).zip(starts)
+        for (((entry, part), level), start) in entries.iter_mut().zip(parts).zip(levels).zip(starts)
         {
-            // Shaders never look past the last region that can be drawn, so clamping is safe.
-            let word = before.min(REGION_SCALE - 1) | *start << 16 | *level << 26;
-            *entry = [(*part as i32 as f32 * inverse).to_bits(), word];
+            // After the last region that can be drawn all are before, which is 0 as in the next cell.
+            let begin = before % REGION_SCALE;
+            *entry = begin | *start << 16 | *level << 26;
             before += *part;
         }
     }
@@ -155,19 +144,28 @@ fn interval_starts(parts: &[u32], starts: &mut Vec<u32>) {
     }
 }
 
-/// Decodes an entry: probability of the region divided by its share of the energy; cumulative
-/// probability of the regions before it, in 65,536ths; region to start the search from in the
-/// interval of this index, at index 0 the last region that can be drawn; weight of a candidate by
-/// visibility. Twin of `guide_entry` in `glsl/guided/guide.glsl`.
-pub fn decode_entry(entry: [u32; 2]) -> (f32, u32, u32, f32) {
-    let level = (entry[1] >> 26) as f32;
+/// Probability of every region of a cell over its share of the energy, by the `entries` of the cell and the
+/// `shares`; 0 where there is no energy. Twin of `guide_entry` in `glsl/guided/guide.glsl`.
+pub fn ratios(entries: &[u32], shares: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
+    let next = entries.iter().skip(1).chain([&0]);
+    entries.iter().zip(next).zip(shares).map(|((entry, next), share)| {
+        let part = next.wrapping_sub(*entry).wrapping_sub(1) % REGION_SCALE + 1;
+        if share > 0.0 { f64::from(part) / (f64::from(REGION_SCALE) * share) } else { 0.0 }
+    })
+}
+
+/// Decodes an entry: cumulative probability of the regions before it, in 65,536ths; region to start the
+/// search from in the interval of this index, at index 0 the last region that can be drawn; weight of a
+/// candidate by visibility. Twin of `guide_word` and `guide_entry`.
+pub fn decode_entry(entry: u32) -> (u32, u32, f32) {
+    let level = (entry >> 26) as f32;
     let weight = (-level * (TARGET_RANGE / (GUIDE_VISIBILITY_LEVELS - 1) as f32)).exp2();
-    (f32::from_bits(entry[0]), entry[1] & 0xffff, entry[1] >> 16 & 0x3ff, weight)
+    (entry & 0xffff, entry >> 16 & 0x3ff, weight)
 }
 
 /// V̂ of an entry, quantised to its levels.
-pub fn decode_visibility(entry: [u32; 2]) -> f64 {
-    f64::from(decode_entry(entry).3.powf(1.0 / TARGET_EXPONENT))
+pub fn decode_visibility(entry: u32) -> f64 {
+    f64::from(decode_entry(entry).2.powf(1.0 / TARGET_EXPONENT))
 }
 
 #[cfg(test)]

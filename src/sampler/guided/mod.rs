@@ -43,7 +43,7 @@ pub use buffers::{GuideBuffers, GuideSize};
 pub use cell_readback::{CellReadback, RegionReadback};
 pub use cells::MAX_CELLS;
 pub use counts::{Count, CountWords, PARTS_PER_RAY};
-pub use entries::{decode_entry, decode_visibility};
+pub use entries::{decode_entry, decode_visibility, ratios};
 pub use epoch::with_epoch;
 pub use estimate::Estimates;
 pub use guide::Guide;

@@ -81,9 +81,9 @@ room! {
         GUIDE: one GuideParameters;
         /// Hash table of the cells: key; index, refined or not, and share of the BRDF.
         GUIDE_TABLE: texels Rg32Uint;
-        /// Density and visibility of each region in each cell (`decode_entry`).
-        GUIDE_ENTRIES: texels Rg32Uint;
-        /// Regions: first alias entry, columns, rows, first row · 65,536 + first column.
+        /// Density and visibility of each region in each cell: a word each, as `guide_word` describes it.
+        GUIDE_ENTRIES: texels R32Uint;
+        /// Regions as `Partition::tables` lays them out.
         GUIDE_REGIONS: texels Rgba32Uint;
         /// Alias tables over the environment's cells in each region: threshold, alias.
         GUIDE_ALIASES: texels Rg32Uint;

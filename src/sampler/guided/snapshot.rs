@@ -7,7 +7,7 @@ use crate::sampler::{
         arriving::Reflected,
         cells::Tree,
         counts::Tally,
-        entries::{EntryTables, EntryWriter, decode_entry},
+        entries::{EntryTables, EntryWriter, ratios},
         estimate::{Estimates, PRIOR_RAYS, RegionTables},
         guide::Guide,
         share::{SHARE_WORDS, ShareEvidence, share_in_256ths},
@@ -23,8 +23,8 @@ pub struct Snapshot {
     /// cells and, from bit [`GUIDE_SHARE_SHIFT`](crate::shader::rooms::guided::GUIDE_SHARE_SHIFT) on,
     /// its share of the BRDF in 256ths, 0 where the material decides.
     pub table: Vec<[u32; 2]>,
-    /// Entries of every cell, region by region.
-    pub entries: Vec<[u32; 2]>,
+    /// Entries of every cell, region by region, and a 0 after them.
+    pub entries: Vec<u32>,
     /// Estimated light from surfaces by cell and direction, relative to the mean over the
     /// directions of the cell; empty where bounces do not teach.
     pub arriving: Vec<f32>,
@@ -49,7 +49,7 @@ impl Guide {
 
         // Estimate the leaves and write the entries of every cell
         let entries = &mut snapshot.entries;
-        entries.resize(self.cell_count() * self.region_count, [0; 2]);
+        entries.resize(self.cell_count() * self.region_count, 0);
         let mut reflected = vec![0.0; self.cell_count()];
         entries.par_chunks_mut(self.region_count).zip(&mut reflected).enumerate().for_each_init(
             || EntryWriter::new(&entry_tables),
@@ -69,6 +69,7 @@ impl Guide {
                 }
             },
         );
+        entries.push(0);
         if let Some(arriving) = &self.arriving {
             (snapshot.arriving, snapshot.reflected) = arriving.estimate(&tree, &reflected);
         }
@@ -117,7 +118,7 @@ impl Guide {
 
     /// Importance of every region to the scene under `snapshot`: the root of the mean over all fine
     /// cells of its probability divided by its share of the energy.
-    pub fn region_importance(&self, snapshot: &Snapshot) -> Vec<f64> {
+    pub fn region_importance(&self, partition: &Partition, snapshot: &Snapshot) -> Vec<f64> {
         let mut sums = vec![0.0; self.region_count];
         let mut cells = 0_u32;
         for (key, entries) in
@@ -127,8 +128,9 @@ impl Guide {
                 continue;
             }
             cells += 1;
-            for (sum, entry) in sums.iter_mut().zip(entries) {
-                *sum += f64::from(decode_entry(*entry).0);
+            let shares = partition.regions.iter().map(|region| region.share);
+            for (sum, ratio) in sums.iter_mut().zip(ratios(entries, shares)) {
+                *sum += ratio;
             }
         }
         if cells == 0 {

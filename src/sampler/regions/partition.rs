@@ -82,12 +82,15 @@ impl Partition {
             .then(|| Self::assemble(Arc::clone(&self.cells), &rectangles))
     }
 
-    /// Returns first alias entry, columns, rows and first place of every region, and all alias entries, as
-    /// devices read them.
+    /// Returns first alias entry, columns + 65,536 · rows, bits of one over the share of the energy (0
+    /// where there is none) and first column + 65,536 · first row of every region, and all alias entries,
+    /// as devices read them.
     pub(in crate::sampler) fn tables(&self) -> (Vec<[u32; 4]>, Vec<[u32; 2]>) {
         let regions = self.regions.iter().map(|region| {
             let Rectangle { first: [column, row], size: [columns, rows], .. } = region.rectangle;
-            [region.first_entry as u32, columns, rows, column | row << 16]
+            let inverse = if region.share > 0.0 { (1.0 / region.share) as f32 } else { 0.0 };
+            let inverse = inverse.min(f32::MAX).to_bits();
+            [region.first_entry as u32, columns | rows << 16, inverse, column | row << 16]
         });
         let aliases = self
             .entries
