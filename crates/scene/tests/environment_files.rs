@@ -259,7 +259,7 @@ fn damaged_files_are_refused_with_a_reason() {
             assert!(refusal(&path).len() > path.display().to_string().len() + 10);
         }
     }
-    let cases: [(&str, &[u8], &str); 11] = [
+    let cases: [(&str, &[u8], &str); 12] = [
         ("magic.hdr", b"no map", "not a readable Radiance file"),
         ("magic.exr", b"no map", "not a readable OpenEXR file"),
         ("word.pfm", b"P6\n2 1\n-1\n", "expected PF or Pf, found \"P6\""),
@@ -269,6 +269,7 @@ fn damaged_files_are_refused_with_a_reason() {
         ("short.pfm", b"PF\n2 1\n-1\n1234", "need 24 bytes, found 4"),
         ("zero.pfm", b"PF\n0 1\n-1\n", "0×1 texels"),
         ("absurd.pfm", b"PF\n4000000000 4000000000\n-1\n", "4000000000×4000000000 texels"),
+        ("long.pfm", b"PF\n40000 2\n-1\n", "at most 32768 along a side"),
         (
             "absurd.hdr",
             b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 400000 +X 800000\n",

@@ -18,6 +18,8 @@ use crate::{
 
 /// Most texels of a map: 16384×8192.
 const MAX_TEXELS: u64 = 1 << 27;
+/// Most texels along a side: samplers keep places in 16 bits.
+const MAX_SIDE: u64 = 1 << 15;
 
 /// Bytes of a texel: its radiance, and its share of the sampling tables.
 const TEXEL_BYTES: u64 = 48;
@@ -130,9 +132,11 @@ fn check_scale(scale: f32) -> Result<(), String> {
 }
 
 fn check_size(width: u64, height: u64) -> Result<(), String> {
-    if width == 0 || height == 0 || width.saturating_mul(height) > MAX_TEXELS {
+    let longest = width.max(height);
+    if width == 0 || height == 0 || longest > MAX_SIDE || width * height > MAX_TEXELS {
         return Err(format!(
-            "{width}×{height} texels; expected at least 1×1 and at most {MAX_TEXELS} in all"
+            "{width}×{height} texels; expected at least 1×1, at most {MAX_SIDE} along a side and \
+             {MAX_TEXELS} in all"
         ));
     }
     let bytes = width.saturating_mul(height).saturating_mul(TEXEL_BYTES);
