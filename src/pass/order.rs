@@ -17,7 +17,7 @@ use crate::shader::{
     structs::Wave,
 };
 
-/// Bits of [`Wave::aovs`] that the pass `features` serves.
+/// Bits of [`PassSettings::aovs`] that the pass `features` serves.
 pub(super) const FEATURES: u32 = AOV_ALBEDO | AOV_NORMAL | AOV_POSITION;
 /// Vertices at which that pass looks for a surface that is not perfectly specular: enough to see through
 /// a drinking glass and what it holds.
@@ -43,7 +43,7 @@ pub struct PassSettings {
     pub shadow_rays: u32,
     /// Path vertices at which environment light is gathered.
     pub depth: u32,
-    /// Bits `AOV_…`.
+    /// Bits `AOV_…`: which extra film buffers are written. Shaders know them as `CONSTANT_AOVS`.
     pub aovs: u32,
     /// Groups of lights that the film keeps apart; 0 if nobody asks for them.
     pub light_groups: u32,
@@ -154,7 +154,7 @@ impl<'a> Order<'a> {
             vertices,
             // Cohorts keep the second vertices of all paths.
             first_listed: if walks_lists { 1 + u32::from(shares) } else { u32::MAX },
-            wave: Wave { aovs: settings.aovs, ..wave },
+            wave,
             dispatches: Vec::new(),
         }
     }
@@ -293,7 +293,7 @@ impl<'a> Order<'a> {
             }
             self.wave.first_shadow_ray += self.wave.shadow_ray_count;
         }
-        self.add_all(steps.finish(&self.wave));
+        self.add_all(steps.finish(&self.wave, self.settings.aovs));
     }
 
     fn gather(&mut self, wave: Wave) {
@@ -307,8 +307,8 @@ impl<'a> Order<'a> {
     }
 
     fn add_features(&mut self) {
-        let Wave { vertex, aovs, is_training, .. } = self.wave;
-        let surfaces = self.settings.surfaces;
+        let Wave { vertex, is_training, .. } = self.wave;
+        let PassSettings { surfaces, aovs, .. } = *self.settings;
         if vertex == 0 && aovs & (AOV_OBJECTS | AOV_MATERIALS) != 0 && is_training == 0 {
             let constants = [&surfaces.constants()[..], &[(CONSTANT_AOVS, aovs)]].concat();
             self.add(Kernel::new("mattes", Domain::Pixels, &constants));

@@ -58,8 +58,8 @@ pub trait Steps {
         Vec::new()
     }
 
-    /// Passes after the last group of a vertex.
-    fn finish(&self, _wave: &Wave) -> Vec<Kernel> {
+    /// Passes after the last group of a vertex, for a film with the extra buffers `AOV_…`.
+    fn finish(&self, _wave: &Wave, _aovs: u32) -> Vec<Kernel> {
         Vec::new()
     }
 

@@ -516,8 +516,6 @@ structs! {
         first_shadow_ray: uint,
         /// Shadow rays per hit over all dispatches.
         total_shadow_rays: uint,
-        /// Bits `AOV_…`: which extra film buffers are written. Shaders know them as `CONSTANT_AOVS`.
-        aovs: uint,
         /// Step in film order from one pixel of the wave to the next; 0 counts as 1.
         pixel_stride: uint,
         /// Step from one block of 8×8 pixels of the wave to the next, in blocks; 0 counts as 1.

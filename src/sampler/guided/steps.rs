@@ -94,8 +94,8 @@ impl Steps for GuidedSteps {
         learn.into_iter().collect()
     }
 
-    fn finish(&self, wave: &Wave) -> Vec<Kernel> {
-        let is_shown = wave.vertex == 0 && wave.aovs & AOV_GUIDE_CELL != 0 && wave.is_training == 0;
+    fn finish(&self, wave: &Wave, aovs: u32) -> Vec<Kernel> {
+        let is_shown = wave.vertex == 0 && aovs & AOV_GUIDE_CELL != 0 && wave.is_training == 0;
         is_shown.then(|| Kernel::new("show_cells", Domain::Pixels, &[])).into_iter().collect()
     }
 

@@ -250,8 +250,8 @@ impl Steps for VisibilitySteps {
         vec![self.product.kernel("sample_and_trace", &constants)]
     }
 
-    fn finish(&self, wave: &Wave) -> Vec<Kernel> {
-        if wave.aovs & AOV_CACHE_ENTRIES == 0 || wave.total_shadow_rays == 0 {
+    fn finish(&self, wave: &Wave, aovs: u32) -> Vec<Kernel> {
+        if aovs & AOV_CACHE_ENTRIES == 0 || wave.total_shadow_rays == 0 {
             return Vec::new();
         }
         let kernel = self.product.kernel("count_entries", &[]);
