@@ -46,17 +46,19 @@ vec3 pixel_at(uvec2 at) {
     bool is_right = at.x > frame.split;
     uvec2 film_size = is_right ? uvec2(frame.right_width, frame.right_height)
                                : uvec2(frame.film_width, frame.film_height);
-    if (frame.is_reduced == 0u) {
-        uvec2 pixel = inside * film_size / uvec2(frame.shown_width, frame.shown_height);
-        return film_value(is_right, pixel.y * film_size.x + pixel.x);
-    }
+    uvec2 low = inside * film_size / uvec2(frame.shown_width, frame.shown_height);
+    vec2 share = vec2(0.0);
+    uint corners = 1u;
     // A smaller film than the scene's stands in for it: pixels as large as blocks would hide what it shows.
-    vec2 scale = vec2(film_size) / vec2(frame.shown_width, frame.shown_height);
-    vec2 place = max((vec2(inside) + 0.5) * scale - 0.5, 0.0);
-    uvec2 low = min(uvec2(place), film_size - 1u);
-    vec2 share = place - vec2(low);
+    if (frame.is_reduced != 0u) {
+        vec2 scale = vec2(film_size) / vec2(frame.shown_width, frame.shown_height);
+        vec2 place = max((vec2(inside) + 0.5) * scale - 0.5, 0.0);
+        low = min(uvec2(place), film_size - 1u);
+        share = place - vec2(low);
+        corners = 4u;
+    }
     vec3 value = vec3(0.0);
-    for (uint corner = 0u; corner < 4u; corner++) {
+    for (uint corner = 0u; corner < corners; corner++) {
         uvec2 by = uvec2(corner & 1u, corner >> 1u);
         uvec2 pixel = min(low + by, film_size - 1u);
         float weight = (by.x == 0u ? 1.0 - share.x : share.x) * (by.y == 0u ? 1.0 - share.y : share.y);
