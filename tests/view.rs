@@ -172,6 +172,22 @@ fn relative_error(one: &[[f32; 3]], other: &[[f32; 3]]) -> f32 {
 }
 
 #[test]
+fn mis_shows_the_scene_before_guided_learns() {
+    let folder = folder();
+    let server = Server::start();
+    let options = ["--depth", "2", "--spp", "4"];
+    let told = |command: &mut Command| {
+        command.env("RUST_LOG", "fenestra=debug");
+    };
+    let mut view = View::open_with(&server, &folder, "room.toml", &options, SIZE, told);
+    view.wait_at_rest("guided 4 spp");
+    view.tap("Escape");
+    let messages = view.end().messages;
+    let place = |text| messages.find(text).unwrap_or_else(|| panic!("{text}: {messages}"));
+    assert!(place("moving: ") < place("by measurement in"), "{messages}");
+}
+
+#[test]
 fn samplers_layers_and_insets_can_be_looked_at() {
     let folder = folder();
     let server = Server::start();

@@ -35,6 +35,7 @@ use crate::{
     error::{Error, Result},
     film::Tone,
     gpu::{Capabilities, Device, Tracer},
+    sampler::Sampler,
     scene::Scene,
     session::Settings,
 };
@@ -370,7 +371,9 @@ fn render(
     let display = window.display_handle().map_err(|error| no_window(&error))?.as_raw();
     let device = Device::open_checked(wanted.as_deref(), validate, tracer, Some(display), check)?;
     let projector = Projector::new(&device, [scene.film.width, scene.film.height])?;
-    let left = Side::new(&device, &scene, None, &settings, None)?;
+    // Show the scene by the sampler with the fewest kernels; the worker goes on with the one asked for.
+    let first = Settings { sampler: Sampler::Mis, ..settings.clone() };
+    let left = Side::new(&device, &scene, None, &first, None)?;
     let panel = Panel::new(&device, window, size, projector, inputs, tone)?;
     let panel = Rc::new(RefCell::new(panel));
     let announce = Box::new(move |status| {

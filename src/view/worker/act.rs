@@ -206,7 +206,7 @@ impl Worker {
         Ok(())
     }
 
-    fn make_side(&self, sampler: Sampler) -> Result<Side> {
+    pub(super) fn make_side(&self, sampler: Sampler) -> Result<Side> {
         let title = format!("{} | preparing {}", self.scene.name, sampler.name());
         (self.announce)(self.status(title));
         let settings = Settings { sampler, ..self.settings.clone() };

@@ -176,7 +176,14 @@ impl Worker {
     pub(crate) fn run(&mut self) -> Result<()> {
         self.tell();
         // A small film shows the scene at once; the whole one takes seconds on a software device.
+        let shrinking = self.shrinking;
         self.start_moving()?;
+        if self.left.sampler != self.settings.sampler {
+            self.left = self.make_side(self.settings.sampler)?;
+            // The time to compile the kernels of the window says nothing about the next film.
+            self.shrinking = shrinking;
+            self.start_moving()?;
+        }
         let mut last = Instant::now();
         loop {
             self.panel.borrow_mut().attend();
