@@ -2,13 +2,15 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests may panic")]
 
+use std::collections::BTreeMap;
+
 use fenestra_scene::{
     Geometry, Scene,
     export::{Settings, gltf, mitsuba, pbrt},
     lamp::LampKind,
     load::LoadOptions,
-    material::{MaterialKind, Surface},
-    math::colour::luminance,
+    material::{ConductorFresnel, Material, MaterialKind, Surface},
+    math::{colour::luminance, random::random_independent_1d},
     texture::{Texels, Texture, TextureUse, Wrap},
 };
 use glam::{Vec2, Vec3};
@@ -287,10 +289,14 @@ fn normal_maps_without_coordinates_are_left_out() {
 #[test]
 fn bright_images_are_cut_off_where_shares_end() {
     let folder = Folder::new();
-    let image = "{ texture = \"a.png\", factor = 0.5, interpolation = \"nearest\" }";
+    // Factors that share an image of glTF are not alike.
+    let image = |factor: f32| {
+        format!("{{ texture = \"a.png\", factor = {factor}, interpolation = \"nearest\" }}")
+    };
+    let [color, roughness, metallic, opacity] = [0.5, 0.4, 0.75, 0.8].map(image);
     let clay = format!(
-        "type = \"principled\"\nbase_color = {image}\nroughness = {image}\nmetallic = {image}\n\
-         opacity = {image}"
+        "type = \"principled\"\nbase_color = {color}\nroughness = {roughness}\n\
+         metallic = {metallic}\nopacity = {opacity}"
     );
     let mut scene = square(&folder, &clay);
     let [dark, bright] = [0.25, 4.0].map(half::f16::from_f32);
@@ -308,15 +314,16 @@ fn bright_images_are_cut_off_where_shares_end() {
     let is_named = |text: &String| text.contains("above 1 in places; it is cut off");
     assert!(warnings.len() == 4 && warnings.iter().all(is_named), "{warnings:?}");
     let at = |used: &Option<TextureUse>, u: f32| used.as_ref().unwrap().value(Vec2::new(u, 0.5)).x;
-    for (u, expected) in [(0.25, 0.125), (0.75, 1.0)] {
+    for (u, texel) in [(0.25, 0.25), (0.75, 4.0)] {
         let Surface { color, roughness, metallic, opacity, .. } = &gltf.materials[0].surface;
         let MaterialKind::Principled(own) = gltf.materials[0].kind else { panic!() };
-        for (name, found) in [
-            ("colour", own.base_color.x * at(color, u)),
-            ("roughness", own.roughness * at(roughness, u)),
-            ("metal", own.metallic * at(metallic, u)),
-            ("opacity", opacity.factor * at(&opacity.texture, u)),
+        for (name, factor, found) in [
+            ("colour", 0.5, own.base_color.x * at(color, u)),
+            ("roughness", 0.4, own.roughness * at(roughness, u)),
+            ("metal", 0.75, own.metallic * at(metallic, u)),
+            ("opacity", 0.8, opacity.factor * at(&opacity.texture, u)),
         ] {
+            let expected = f32::min(factor * texel, 1.0);
             assert!((found - expected).abs() < 2e-3, "{name} at {u}: {found}, not {expected}");
         }
     }
@@ -324,12 +331,14 @@ fn bright_images_are_cut_off_where_shares_end() {
     let clay = "type = \"diffuse\"\nreflectance = [0, 0, 0]\nemission_two_sided = true\n\
                 emission = { texture = \"a.png\", interpolation = \"nearest\" }";
     let mut scene = square(&folder, clay);
-    brighten(&mut scene.materials[0].surface.emission.as_mut().unwrap().texture);
+    let emission = scene.materials[0].surface.emission.as_mut().unwrap();
+    emission.radiance *= 1.5;
+    brighten(&mut emission.texture);
     mitsuba::export(&scene, &path, SETTINGS).write().unwrap();
-    let [(_, gltf), _] = again(&folder, &scene);
-    for read in [Scene::load(&path).unwrap(), gltf] {
+    let [(_, gltf), (_, pbrt)] = again(&folder, &scene);
+    for read in [Scene::load(&path).unwrap(), gltf, pbrt] {
         let emission = read.materials[0].surface.emission.as_ref().unwrap();
-        for (u, expected) in [(0.25, 0.25), (0.75, 4.0)] {
+        for (u, expected) in [(0.25, 0.375), (0.75, 6.0)] {
             let found = emission.radiance.x * at(&emission.texture, u);
             assert!((found - expected).abs() < 4e-3, "{found}, not {expected}");
         }
@@ -621,4 +630,152 @@ fn gltf_keeps_matrices_of_scale_turn_and_shift() {
     assert_eq!(read(same), (same, false));
     let text = std::fs::read_to_string(folder.path().join("a.gltf")).unwrap();
     assert!(!text.contains("KHR_texture_transform"), "{text}");
+}
+
+/// Properties of a square's material at a place, given by three corners and the shares of their edges.
+fn properties(scene: &Scene, corners: [Vec3; 3], at: Vec2) -> BTreeMap<&'static str, Vec3> {
+    let geometry = &scene.geometry;
+    let vertices = corners.map(|corner| {
+        let distance = |vertex: &usize| Vec3::from(geometry.positions[*vertex]).distance(corner);
+        let vertices = 0..geometry.positions.len();
+        vertices.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+    });
+    let value = |used: &Option<TextureUse>| {
+        let Some(used) = used else { return Vec3::ONE };
+        let uvs = &geometry.uvs[used.uv_set as usize];
+        let [a, b, c] = vertices.map(|vertex| Vec2::from(uvs[vertex]));
+        let uv = (a + at.x * (b - a) + at.y * (c - a)).extend(1.0);
+        let [u, v] = used.image_from_uv.map(|row| Vec3::from(row).dot(uv));
+        used.value(Vec2::new(u, v)).truncate()
+    };
+    let Material { kind, surface, .. } = &scene.materials[0];
+    let number = |used: &Option<TextureUse>| luminance(value(used).min(Vec3::ONE));
+    let mut found = BTreeMap::from([
+        ("opacity", Vec3::splat(surface.opacity.factor * number(&surface.opacity.texture))),
+        ("light", surface.emission.as_ref().map_or(Vec3::ZERO, |e| e.radiance * value(&e.texture))),
+    ]);
+    let mut alpha = |alpha: f32| {
+        let rough = number(&surface.roughness);
+        found.insert("alpha", Vec3::splat(alpha * rough * rough));
+    };
+    let mut rest = Vec::new();
+    let color = match kind {
+        MaterialKind::Principled(own) => {
+            alpha(own.roughness * own.roughness);
+            rest.push(("metal", Vec3::splat(own.metallic * number(&surface.metallic))));
+            own.base_color
+        }
+        MaterialKind::Conductor { alpha: width, fresnel } => {
+            alpha(*width);
+            let (name, color) = match fresnel {
+                ConductorFresnel::Schlick { reflectance } => ("colour", *reflectance),
+                ConductorFresnel::Exact { .. } => {
+                    ("of exact metals", fresnel.at_normal_incidence())
+                }
+            };
+            rest.push((name, color));
+            Vec3::ONE
+        }
+        MaterialKind::Dielectric { ior, alpha: width, transmittance, .. } => {
+            alpha(*width);
+            rest.push(("index", Vec3::splat(*ior)));
+            *transmittance
+        }
+        MaterialKind::Diffuse { reflectance } => *reflectance,
+        other => panic!("{other:?}"),
+    };
+    found.extend(rest);
+    let color = found.get("colour").copied().unwrap_or(color);
+    found.insert("colour", (color * value(&surface.color)).min(Vec3::ONE));
+    found
+}
+
+/// Random materials, in which no factor is 1 and no two numbers are alike.
+#[test]
+fn properties_that_no_warning_names_come_back() {
+    let folder = Folder::new();
+    let mut counts: BTreeMap<(&str, &str), usize> = BTreeMap::new();
+    for case in 0..60 {
+        let random: Vec<f32> =
+            (0..32).map(|at| 0.1 + 0.8 * random_independent_1d(case, 7, at, 0)).collect();
+        let image = |at: usize, factor: f32| {
+            let wrap = if random[at + 3] < 0.5 { "clamp" } else { "repeat" };
+            format!(
+                "{{ texture = \"a.png\", factor = {factor}, offset = [{}, 0], wrap = \"{wrap}\" }}",
+                random[at + 1]
+            )
+        };
+        let color = |at: usize, factor: f32| match random[at] < 0.5 {
+            true => image(at, factor * random[at + 2]),
+            false => format!("[{}, {}, {factor}]", 0.5 * random[at + 1], random[at + 2]),
+        };
+        let number = |at: usize| match random[at] < 0.5 {
+            true => image(at, random[at + 2]),
+            false => random[at + 1].to_string(),
+        };
+        let mut clay = match case % 5 {
+            0 => format!("type = \"diffuse\"\nreflectance = {}", color(0, 0.8)),
+            1 => format!(
+                "type = \"principled\"\nbase_color = {}\nroughness = {}\nmetallic = {}",
+                color(0, 0.8),
+                number(3),
+                number(6)
+            ),
+            2 => format!(
+                "type = \"conductor\"\neta = [{}, 1.3, 0.9]\nk = [3, {}, 2.5]\nroughness = {}",
+                random[0],
+                5.0 * random[1],
+                random[3]
+            ),
+            3 => format!(
+                "type = \"conductor\"\nreflectance = {}\nroughness = {}",
+                color(0, 0.8),
+                number(3)
+            ),
+            _ => format!(
+                "type = \"dielectric\"\nior = {}\nroughness = {}\ntransmittance = {}",
+                1.2 + random[0],
+                random[3],
+                color(6, 0.9)
+            ),
+        };
+        if random[9] < 0.6 {
+            clay += &format!("\nemission_two_sided = true\nemission = {}", color(10, 3.0));
+        }
+        if random[13] < 0.4 {
+            clay += &format!("\nopacity = {}", number(14));
+        }
+        let scene = square(&folder, &clay);
+        let [.., a, b, _, c] = &scene.geometry.positions[..] else { panic!() };
+        let corners = [*a, *b, *c].map(Vec3::from);
+        let [gltf, pbrt, xml] = ["a.gltf", "a.pbrt", "a.xml"].map(|name| folder.path().join(name));
+        let exports = [
+            ("glTF", &gltf, gltf::export(&scene, &gltf)),
+            ("pbrt", &pbrt, pbrt::export(&scene, &pbrt, SETTINGS)),
+            ("Mitsuba", &xml, mitsuba::export(&scene, &xml, SETTINGS)),
+        ];
+        for (format, path, export) in exports {
+            if export.warnings.iter().any(|text| text.starts_with("material")) {
+                continue;
+            }
+            export.write().unwrap();
+            let read = Scene::load(path).unwrap();
+            for at in [0.1, 0.35, 0.8].map(|x| Vec2::new(x, 0.3)) {
+                let [ours, theirs] = [&scene, &read].map(|scene| properties(scene, corners, at));
+                for (name, ours) in ours {
+                    let Some(theirs) = theirs.get(name) else { continue };
+                    *counts.entry((format, name)).or_default() += 1;
+                    assert!(
+                        ours.abs_diff_eq(*theirs, 0.01 * ours.max_element().max(0.6)),
+                        "{format}, {name} at {at}: {ours}, not {theirs}, of\n{clay}"
+                    );
+                }
+            }
+        }
+    }
+    for format in ["glTF", "pbrt", "Mitsuba"] {
+        for name in ["alpha", "colour", "light", "opacity"] {
+            assert!(counts[&(format, name)] > 20, "{counts:?}");
+        }
+    }
 }

@@ -578,6 +578,15 @@ fn what_lies_below_a_surface_gives_its_colour() {
     // The width 0.3 makes 5.888 of the polynomial: (ln 0.5 / 5.888)² and so on.
     close(hair(r#""rgb sigma_a" [0.013858 0.055432 0]"#), [0.5, 0.25, 1.0], 1e-3);
     close(hair(r#""float pheomelanin" 0"#), [1.0; 3], 1e-6);
+    // Each pigment absorbs by colours of its own [d'Eon et al. 2011], as pbrt-v4 has them.
+    for (pigments, absorption) in [
+        (r#""float eumelanin" 0.5"#, "0.2095 0.3485 0.685"),
+        (r#""float pheomelanin" 0.5"#, "0.0935 0.2 0.525"),
+        (r#""float eumelanin" 0.5 "float pheomelanin" 0.5"#, "0.303 0.5485 1.21"),
+    ] {
+        let own = hair(&format!(r#""rgb sigma_a" [{absorption}]"#));
+        close(hair(pigments), own.to_array(), 1e-6);
+    }
     let [brown, fair] = [hair(""), hair(r#""float eumelanin" 0.13"#)];
     close(brown, fair.map(|share| share.powf(10_f32.sqrt())).to_array(), 1e-5);
     assert!(fair.x > 1.4 * fair.y && fair.y > 1.4 * fair.z, "{fair}");
