@@ -120,20 +120,22 @@ fn samples_follow_the_density_which_integrates_to_one() {
 fn the_shader_agrees() {
     let _alone = support::alone();
     let number = |index, dimension| random_independent_1d(index, 5, dimension, 2);
-    let mut inputs: Vec<[f32; 10]> = Vec::new();
+    let mut inputs: Vec<[f32; 13]> = Vec::new();
     for index in 0..2000 {
         let (from, size) = RECTANGLES[index as usize % RECTANGLES.len()];
-        let mut input = [0.0; 10];
+        let mut input = [0.0; 13];
         input[..3].copy_from_slice(&from.to_array());
         input[3..5].copy_from_slice(&size.to_array());
         input[5..7].copy_from_slice(&[number(index, 0), number(index, 1)]);
         // Half of the directions meet the rectangle.
         let along = Vec2::new(number(index, 2), number(index, 3)) * 2.0 - 0.5;
         let at = (from + (along * size).extend(0.0)).normalize();
-        input[7..].copy_from_slice(&at.to_array());
+        input[7..10].copy_from_slice(&at.to_array());
+        let normal = [4, 5, 6].map(|dimension| number(index, dimension) - 0.5);
+        input[10..].copy_from_slice(&normal);
         inputs.push(input);
     }
-    let output: Vec<[f32; 5]> = support::run_probe("spherical_rectangle", &[], &[], &inputs);
+    let output: Vec<[f32; 6]> = support::run_probe("spherical_rectangle", &[], &[], &inputs);
     for (input, shader) in inputs.iter().zip(&output) {
         let rectangle = seen(Vec3::from_slice(input), Vec2::from_slice(&input[3..]));
         let direction = rectangle.sample(Vec2::from_slice(&input[5..]));
@@ -143,6 +145,15 @@ fn the_shader_agrees() {
         assert!(close(shader[1], pdf), "{input:?}: density {}, not {pdf}", shader[1]);
         let distance = direction.distance(Vec3::from_slice(&shader[2..]));
         assert!(distance < 1e-3, "{input:?}: {shader:?}, not {direction}");
+        // A portal that reaches above a horizon anywhere lights what lies there.
+        let corners = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]].map(|along| {
+            let corner = (Vec2::from(along) * Vec2::from_slice(&input[3..])).extend(0.0);
+            (Vec3::from_slice(input) + corner).dot(Vec3::from_slice(&input[10..]))
+        });
+        let above = corners.iter().filter(|height| **height > 0.0).count();
+        if corners.iter().all(|height| height.abs() > 1e-5) {
+            assert_eq!(shader[5] == 1.0, above == 0, "{input:?}: {corners:?}");
+        }
     }
 }
 

@@ -115,3 +115,11 @@ float spherical_rectangle_pdf(SphericalRectangle seen, vec3 direction) {
         ? spherical_rectangle_density(seen, direction)
         : 0.0;
 }
+
+// True if all corners are below the plane of `normal` through the point.
+bool is_below(SphericalRectangle seen, vec3 normal) {
+    vec3 across = vec3(
+        dot(seen.x_axis, normal), dot(seen.y_axis, normal), dot(seen.z_axis, normal));
+    vec2 highest = max(seen.low * across.xy, seen.high * across.xy);
+    return highest.x + highest.y + seen.distance * across.z <= 0.0;
+}

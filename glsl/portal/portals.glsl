@@ -10,14 +10,6 @@ layout(constant_id = CONSTANT_PORTALS) const uint PORTALS = 0u;
 // Share of the portals among directions that are not from the BRDF; the rest is the environment's.
 layout(constant_id = CONSTANT_PORTAL_SHARE) const float PORTAL_SHARE = 0.5;
 
-// True if all corners are below the plane of `normal` through the point.
-bool is_below(SphericalRectangle seen, vec3 normal) {
-    vec3 across = vec3(
-        dot(seen.x_axis, normal), dot(seen.y_axis, normal), dot(seen.z_axis, normal));
-    vec2 highest = max(seen.low * across.xy, seen.high * across.xy);
-    return highest.x + highest.y + seen.distance * across.z <= 0.0;
-}
-
 // Portal from a vertex; its solid angle is 0 where no light through it is reflected.
 SphericalRectangle load_portal(Vertex vertex, uint portal) {
     int texel = int(3u * portal);

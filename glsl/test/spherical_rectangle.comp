@@ -1,4 +1,5 @@
-// Probe of spherical_rectangle.glsl: rectangle, two random numbers and a direction in, everything out.
+// Probe of spherical_rectangle.glsl: rectangle, two random numbers, a direction and a
+// normal in, everything out.
 #version 460
 
 #include "spherical_rectangle.glsl"
@@ -9,12 +10,14 @@ struct ProbeInput {
     vec2 size;
     vec2 u;
     vec3 direction;
+    vec3 normal;
 };
 
 struct ProbeOutput {
     float solid_angle;
     float pdf;
     vec3 sampled_direction;
+    float is_below;
 };
 
 ProbeOutput answer(ProbeInput probe) {
@@ -22,7 +25,7 @@ ProbeOutput answer(ProbeInput probe) {
         probe.corner, vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), probe.size);
     return ProbeOutput(
         seen.solid_angle, spherical_rectangle_pdf(seen, probe.direction),
-        spherical_rectangle_sample(seen, probe.u));
+        spherical_rectangle_sample(seen, probe.u), float(is_below(seen, probe.normal)));
 }
 
 ANSWER_QUERIES(ProbeInput, ProbeOutput, answer)
