@@ -7,7 +7,7 @@ use std::{f32::consts::PI, sync::Arc};
 use fenestra::{
     sampler::Sampler,
     scene::{
-        Geometry, Scene,
+        Filter, Geometry, Scene,
         lamp::{LampKind, Spot, SpotFalloff},
         material::{Emission, Material, MaterialKind},
         texture::{Encoding, Interpolation, Texels, Texture, TextureUse},
@@ -615,4 +615,49 @@ fn the_back_of_a_one_sided_surface_is_black() {
     scene.geometry.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
     let back = mean(&scene, settings(Sampler::Mis, 2));
     assert!((front - 1.0).abs() < 1e-3 && back < 0.9, "{front} and {back}");
+}
+
+/// Lamps are near the floor's middle or far from it, and light it by way of a green ceiling too: lamps that
+/// one vertex of a path draws tell nothing of those that the next one draws.
+#[test]
+fn every_vertex_draws_lamps_of_its_own() {
+    const SAMPLES: usize = 32;
+    let _alone = support::alone();
+    let mut scene = scenes::plane(Vec3::splat(0.5), scenes::environment(16, |_| Vec3::ZERO));
+    scene.film.filter = Filter::Box;
+    scene.materials.push(scenes::diffuse(Vec3::new(0.0, 0.8, 0.0)));
+    scenes::add_box(&mut scene.geometry, Vec3::new(0.0, 6.5, 0.0), Vec3::new(100.0, 1.0, 100.0), 1);
+    for x in [-0.3, -0.1, 0.1, 0.3] {
+        scenes::add_point(&mut scene, Vec3::new(x, 2.5, 0.2), Vec3::splat(9.0));
+        scenes::add_point(&mut scene, Vec3::new(100.0 * x, 2.5, 30.0), Vec3::splat(9.0));
+    }
+    let settings = Settings { depth: 2, shadow_rays: 1, ..Settings::default() };
+    let mut renderer = support::renderer(&scene, settings);
+    let pixels = 0..(scene.film.width * scene.film.height) as usize;
+    let mut before = vec![[0.0; 3]; pixels.len()];
+    let mut light = vec![[[0.0; SAMPLES]; 2]; pixels.len()];
+    for sample in 0..SAMPLES {
+        renderer.render_pass(1).unwrap();
+        let sums = renderer.sums().unwrap();
+        for pixel in pixels.clone() {
+            let now = sums.total(pixel);
+            let [red, green] = [0, 1].map(|channel| now[channel] - before[pixel][channel]);
+            light[pixel][0][sample] = red;
+            light[pixel][1][sample] = green - red;
+            before[pixel] = now;
+        }
+    }
+    let (mut squares, mut product) = ([0.0; 2], 0.0);
+    for of_pixel in &light {
+        let off = of_pixel.map(|values| {
+            let mean = values.iter().sum::<f64>() / SAMPLES as f64;
+            values.map(|value| value - mean)
+        });
+        for (first, second) in off[0].iter().zip(off[1]) {
+            squares = [squares[0] + first * first, squares[1] + second * second];
+            product += first * second;
+        }
+    }
+    let correlation = product / (squares[0] * squares[1]).sqrt();
+    assert!(squares.iter().all(|sum| *sum > 0.0) && correlation.abs() < 0.1, "{correlation}");
 }

@@ -616,8 +616,9 @@ fn textures_of_one_value_are_factors() {
     ];
     let used = |value: [f32; 3]| {
         let [r, g, b] = value.map(f16::from_f32);
+        // Halves are linear, whatever the role of their image says.
         Some(TextureUse {
-            encoding: Encoding::Linear,
+            encoding: Encoding::Srgb,
             ..TextureUse::new(texture(1, 1, Texels::Halves(vec![[r, g, b, f16::ONE]])))
         })
     };

@@ -311,9 +311,15 @@ fn convert(lamp: &Lamp, groups: &LightGroups) -> structs::Lamp {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests may panic")]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use crate::pass::lamp_cells::tests::parsed;
+    use crate::{
+        pass::lamp_cells::tests::parsed,
+        texture::{Encoding, Texels, Texture, TextureUse},
+    };
 
     /// The draws follow the power: of a triangle that emits to one side or two, of spots, whose light from
     /// the inner to the outer angle counts by half, and of directional lamps on the disc that hides all.
@@ -337,22 +343,35 @@ mod tests {
             .to_owned()
             + &square("one", "", 0.0)
             + &square("two", "emission_two_sided = true", 4.0);
-        let (_, accel, tables) = parsed(&text);
+        let (mut scene, accel, tables) = parsed(&text);
         // After the environment's.
         assert!(tables.lamps.iter().map(|lamp| lamp.light_group).eq(1..4), "{:?}", tables.lamps);
-        let mut drawn = [0.0; 5];
-        for choice in &tables.choices {
-            let index = match choice.source {
-                lamp if lamp & LAMP_BIT != 0 => lamp & !LAMP_BIT,
-                triangle => 3 + accel.triangle_materials[triangle as usize],
-            };
-            drawn[index as usize] += choice.probability;
-        }
         // Over π: 4 · 3; 2 · 12 · ½; 4 times the squared radius of 5 m × 1 m × 1 m; 6 m² of each box, of one
         // side or two.
-        let expected = [12.0, 12.0, 27.0, 6.0, 12.0].map(|power| power / 69.0);
-        for (drawn, expected) in drawn.into_iter().zip(expected) {
-            assert!((drawn - expected).abs() < 1e-5, "{drawn}, expected {expected}");
+        let powers = [12.0, 12.0, 27.0, 6.0, 12.0];
+        // The image of a lamp counts by its mean.
+        let texels = Texels::Bytes(vec![[51, 51, 51, 255], [153, 153, 153, 255]]);
+        let texture = Arc::new(Texture { name: String::new(), width: 2, height: 1, texels });
+        let used = TextureUse { encoding: Encoding::Linear, ..TextureUse::new(texture) };
+        let emission =
+            scene.materials.iter_mut().rev().find_map(|own| own.surface.emission.as_mut());
+        emission.unwrap().texture = Some(used);
+        let darker = LampTables::new(&scene, &accel, &LightGroups::new(&scene));
+        for (tables, last) in [(tables, 1.0), (darker, 0.4)] {
+            let mut drawn = [0.0; 5];
+            for choice in &tables.choices {
+                let index = match choice.source {
+                    lamp if lamp & LAMP_BIT != 0 => lamp & !LAMP_BIT,
+                    triangle => 3 + accel.triangle_materials[triangle as usize],
+                };
+                drawn[index as usize] += choice.probability;
+            }
+            let expected = [&powers[..4], &[last * powers[4]]].concat();
+            let total: f32 = expected.iter().sum();
+            for (drawn, expected) in drawn.into_iter().zip(expected) {
+                let expected = expected / total;
+                assert!((drawn - expected).abs() < 1e-5, "{drawn}, expected {expected}");
+            }
         }
     }
 
