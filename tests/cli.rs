@@ -155,6 +155,9 @@ fn comparison_prints_the_metrics_and_fails_over_a_threshold() {
     let below = |value: &str| folder.run(&["compare", "b.exr", "a.exr", "--fail-below", value]);
     below("mse=0.009").assert(0, &[]);
     below("mse=0.02").assert(3, &["error: mse is ", "below the threshold 0.02"]);
+    // Both halves of a reference count: that which meets the image leaves no error.
+    let halves = ["compare", "b.exr", "a.exr", "--second-reference", "b.exr"];
+    folder.run(&[&halves[..], &["--fail-above", "mse=0"]].concat()).assert(0, &[]);
 }
 
 #[test]

@@ -342,6 +342,9 @@ fn a_resumed_run_tells_how_far_it_is() {
     let took = again.pass(1, 1.0).unwrap();
     let left = again.standing(&rules).seconds_left.unwrap();
     assert!((left / (31.0 * took) - 1.0).abs() < 1e-9, "{left} s left, {took} s a sample");
+    // A limit of time counts the seconds before the checkpoint too.
+    let rules = Rules { seconds: Some(2.0 * again.seconds()), ..Rules::default() };
+    assert_eq!(again.standing(&rules).fraction, 0.5);
     let totals = again.renderer.totals();
     let rays = (totals.camera_rays + totals.bounce_rays + totals.shadow_rays_traced) as f64;
     let rate = again.standing(&rules).rays_per_second;

@@ -178,12 +178,14 @@ fn a_study_has_every_figure() {
     assert_eq!(check["description"], format!("env, two halves of {half_spp} spp,"));
     assert_ne!(check["verdict"], "disagrees", "{check}");
     assert!(check["spp"].as_u64().unwrap() >= 2 && check["seconds"].as_f64().unwrap() > 0.0);
-    let seeds = [1, 2].map(|half| {
+    let halves = [1, 2].map(|half| {
         let path = folder.path().join(format!("report/images/yard/reference_check_{half}.exr"));
-        let metadata = Metadata::load(&Image::read_exr(&path).unwrap(), &path).unwrap();
-        metadata.sample_ranges[0].seed
+        Metadata::load(&Image::read_exr(&path).unwrap(), &path).unwrap()
     });
-    assert_ne!(seeds[0], seeds[1]);
+    let [first, second] = &halves;
+    assert_ne!(first.sample_ranges[0].seed, second.sample_ranges[0].seed);
+    let seconds = check["seconds"].as_f64().unwrap();
+    assert!((seconds / (first.seconds + second.seconds) - 1.0).abs() < 1e-6, "{check}");
     assert!(results["circumstances"]["device"].is_string());
     let share = results["scenes"][0]["parts"]["surface_share"].as_f64().unwrap();
     assert!(share > 0.0 && share < 1.0, "the sky is in the frame: {share}");
