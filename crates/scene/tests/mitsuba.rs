@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 use std::{
+    collections::HashMap,
     f32::consts::{FRAC_PI_2, PI},
     io::Write,
     path::Path,
@@ -2000,6 +2001,115 @@ fn a_real_environment_has_the_radiance_of_mitsuba() {
             let found = scene.environment.radiance(direction.normalize());
             let ratio = found / expected;
             assert!(ratio.abs_diff_eq(Vec3::ONE, within), "{turn}: {found}, expected {expected}");
+        }
+    }
+}
+
+/// Each parameter, alone in place of `@`, makes a scene that no other parameter of its value makes.
+#[test]
+fn every_parameter_counts_and_none_for_another() {
+    let surface = |kind: &str| {
+        format!("{SENSOR}<shape type=\"rectangle\"><bsdf type=\"{kind}\">@</bsdf></shape>")
+    };
+    let shape = |kind: &str| format!("{SENSOR}<shape type=\"{kind}\">@</shape>");
+    let emitter = |kind: &str| format!("{SENSOR}<emitter type=\"{kind}\">@</emitter>");
+    let masks = r#"<bsdf type="mask"><float name="opacity" value="0.3"/><bsdf type="mask">@
+        <bsdf type="diffuse"/></bsdf></bsdf>"#;
+    let medium = r#"<bsdf type="dielectric"/><medium name="interior" type="homogeneous">
+        <float name="albedo" value="0"/>@</medium>"#;
+    let groups = [
+        (
+            r#"<sensor type="thinlens"><float name="aperture_radius" value="0.1"/>@</sensor>"#
+                .to_owned(),
+            "float fov 50|string focal_length 70mm|float focus_distance 3|\
+             float principal_point_offset_x 0.1|float principal_point_offset_y 0.1",
+        ),
+        (
+            r#"<sensor type="perspective"><film type="hdrfilm">@</film></sensor>"#.to_owned(),
+            "integer width 500|integer height 500|integer crop_width 500|integer crop_height 500",
+        ),
+        (
+            r#"<sensor type="perspective"><film type="hdrfilm"><integer name="crop_width" value="500"/>
+            <integer name="crop_height" value="500"/>@</film></sensor>"#
+                .to_owned(),
+            "integer crop_offset_x 30|integer crop_offset_y 30",
+        ),
+        (surface("diffuse"), "float reflectance .3"),
+        (
+            surface("roughconductor"),
+            "float alpha .3|float eta .3|float k .3|string material Ag|\
+             float specular_reflectance .3|string distribution ggx",
+        ),
+        (
+            surface("conductor").replace('@', "<string name=\"material\" value=\"Ag\"/>@"),
+            "float ext_eta 1.3|float specular_reflectance .3",
+        ),
+        (
+            surface("roughplastic"),
+            "float alpha .3|float int_ior 1.3|float ext_ior 1.3|float diffuse_reflectance .3|\
+             boolean nonlinear true|string distribution ggx",
+        ),
+        (
+            surface("plastic"),
+            "float int_ior 1.3|float ext_ior 1.3|float diffuse_reflectance .3|boolean nonlinear true",
+        ),
+        (
+            surface("roughdielectric"),
+            "float alpha .3|float int_ior 1.3|float ext_ior 1.3|float specular_reflectance .3|\
+             float specular_transmittance .3|string distribution ggx",
+        ),
+        (
+            surface("thindielectric"),
+            "float int_ior 1.3|float ext_ior 1.3|float specular_reflectance .3|\
+             float specular_transmittance .3",
+        ),
+        (
+            surface("principled"),
+            "float base_color .3|float roughness .3|float metallic .3|float anisotropic .3|\
+             float clearcoat .3|float eta 1.3|float specular .3|float spec_trans .6",
+        ),
+        (surface("principledthin"), "float base_color .3|float diff_trans .3"),
+        (surface("mask").replace('@', "@<bsdf type=\"diffuse\"/>"), "float opacity .3"),
+        (
+            surface("diffuse").replace("<bsdf type=\"diffuse\">@</bsdf>", masks),
+            "float opacity .3|float opacity .6",
+        ),
+        (
+            surface("diffuse").replace("<bsdf type=\"diffuse\">@</bsdf>", medium),
+            "float sigma_t .3|float scale .5",
+        ),
+        (emitter("point"), "point position 1,0,0|rgb intensity 1,2,3"),
+        (emitter("spot"), "rgb intensity 1,2,3|float cutoff_angle 10|float beam_width 10"),
+        (emitter("directional"), "vector direction 1,0,0|rgb irradiance 1,2,3"),
+        (emitter("constant"), "rgb radiance 1,2,3"),
+        (
+            shape("rectangle").replace('@', "<emitter type=\"area\">@</emitter>"),
+            "rgb radiance 1,2,3|float radiance 2",
+        ),
+        (shape("sphere"), "float radius 2|point center 0,0,2|boolean flip_normals true"),
+        (
+            shape("cylinder"),
+            "float radius 2|point p0 0,0,.5|point p1 0,0,.5|boolean flip_normals true",
+        ),
+        (shape("disk"), "boolean flip_normals true"),
+        (
+            surface("diffuse")
+                .replace('@', "<texture name=\"reflectance\" type=\"checkerboard\">@</texture>"),
+            "float color0 .3|float color1 .3|float uscale .3|float vscale .3|float uoffset .3|\
+             float voffset .3|float uvscale .3",
+        ),
+    ];
+    for (text, parameters) in groups {
+        let folder = Folder::new();
+        let hash = |stated: &str| {
+            loaded(&folder.write("a.xml", document(&text.replace('@', stated)))).hash
+        };
+        let mut seen = HashMap::from([(hash(""), "")]);
+        for parameter in parameters.split('|') {
+            let [tag, name, value] =
+                parameter.trim().splitn(3, ' ').collect::<Vec<_>>().try_into().unwrap();
+            let own = hash(&format!("<{tag} name=\"{name}\" value=\"{value}\"/>"));
+            assert_eq!(seen.insert(own, parameter), None, "{text}: {parameter}");
         }
     }
 }

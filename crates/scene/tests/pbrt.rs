@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 use std::{
+    collections::HashMap,
     f32::consts::{FRAC_PI_2, PI},
     path::Path,
 };
@@ -1738,4 +1739,124 @@ fn real_scenes_load_whole() {
     assert!(found.contains("living-room.pbrt:") && found.contains("cannot read"), "{found}");
     let plain = real("staircase2/staircase2.pbrt").unwrap();
     assert!(warnings(&plain)[1].contains("wood5.tga: cannot read"), "{:?}", plain.warnings);
+}
+
+/// Each parameter, alone in place of `@`, makes a scene that no other parameter of its value makes.
+#[test]
+fn every_parameter_counts_and_none_for_another() {
+    let lit = format!("LightSource \"point\" {TRIANGLE}");
+    let surface = |kind: &str| format!("Material {kind} @ {TRIANGLE}");
+    let texture = |kind: &str| {
+        let used = "Material \"diffuse\" \"texture reflectance\" \"t\"";
+        format!("Texture \"t\" \"spectrum\" \"{kind}\" @ {used} {TRIANGLE}")
+    };
+    let light = |kind: &str| format!("LightSource \"{kind}\" @");
+    let color = "[.1 .2 .3]";
+    let coated = r#""rgb sigma_a" [1 2 3] "rgb sigma_s" [3 2 1]"#;
+    let groups = [
+        (
+            r#"Camera "perspective" "float lensradius" 0.1 @"#,
+            lit.clone(),
+            "float fov 50|float screenwindow [-1 1 -1 3]|float shutteropen 0.5|float shutterclose 0.25|\
+             float focaldistance 3",
+        ),
+        (
+            r#"Film "rgb" @ Camera "perspective""#,
+            lit,
+            "integer xresolution 64|integer yresolution 64|float iso 50|float whitebalance 4000|\
+             integer pixelbounds [0 8 0 9]|float cropwindow [0 0.5 0 0.25]",
+        ),
+        (
+            MIRRORED,
+            light("distant"),
+            "rgb L C|float scale 2|float illuminance 3|point3 from [1 0 0]|point3 to [1 0 0]",
+        ),
+        (MIRRORED, light("point"), "rgb I C|float scale 2|float power 2|point3 from [1 0 0]"),
+        (
+            MIRRORED,
+            light("spot"),
+            "rgb I C|float scale 2|float power 2|point3 from [1 0 0]|point3 to [1 0 0]|\
+             float coneangle 20|float conedeltaangle 20",
+        ),
+        (MIRRORED, light("infinite"), "rgb L C|float scale 2|float illuminance 2"),
+        (
+            MIRRORED,
+            format!("AreaLightSource \"diffuse\" @ {TRIANGLE}"),
+            "rgb L C|float scale 2|float power 2|bool twosided true",
+        ),
+        (
+            MIRRORED,
+            surface("\"coateddiffuse\""),
+            "rgb reflectance C|float roughness .2|float eta 1.8",
+        ),
+        (
+            MIRRORED,
+            surface("\"coateddiffuse\" \"float roughness\" 0.2"),
+            "bool remaproughness false",
+        ),
+        (
+            MIRRORED,
+            surface("\"conductor\""),
+            "float roughness .2|float uroughness .2|float vroughness .2|rgb eta C|rgb k C|rgb reflectance C",
+        ),
+        (
+            MIRRORED,
+            surface("\"coatedconductor\""),
+            "float conductor.roughness .2|float interface.roughness .2|rgb conductor.eta C|\
+             rgb conductor.k C|float interface.eta 1.8|rgb reflectance C",
+        ),
+        (MIRRORED, surface("\"dielectric\""), "float eta 1.8|float roughness .2"),
+        (MIRRORED, surface("\"thindielectric\""), "float eta 1.8"),
+        (
+            MIRRORED,
+            surface("\"diffusetransmission\""),
+            "rgb reflectance C|rgb transmittance C|float scale .5",
+        ),
+        (
+            MIRRORED,
+            surface(&format!("\"subsurface\" {coated}")),
+            "float g .5|float eta 1.6|float roughness .2",
+        ),
+        (MIRRORED, surface("\"subsurface\""), "string name \"Ketchup\"|rgb reflectance C"),
+        (
+            MIRRORED,
+            surface("\"hair\""),
+            "rgb sigma_a C|float eumelanin .5|float pheomelanin .5|rgb reflectance C|float beta_n .5",
+        ),
+        (MIRRORED, texture("mix"), "rgb tex1 C|rgb tex2 C|float amount .3"),
+        (MIRRORED, texture("scale"), "rgb tex C|float scale .5"),
+        (
+            MIRRORED,
+            texture("checkerboard"),
+            "rgb tex1 C|rgb tex2 C|float uscale 2|float vscale 2|float udelta .3|float vdelta .3",
+        ),
+        (
+            MIRRORED,
+            "Shape \"sphere\" @".to_owned(),
+            "float radius 2|float zmin .5|float zmax .5|float phimax 90|float alpha .5",
+        ),
+        (
+            MIRRORED,
+            "Shape \"disk\" @".to_owned(),
+            "float radius 2|float innerradius .5|float height .5|float phimax 90|float alpha .5",
+        ),
+        (
+            MIRRORED,
+            "Shape \"cylinder\" @".to_owned(),
+            "float radius 2|float zmin .5|float zmax .5|float phimax 90|float alpha .5",
+        ),
+    ];
+    for (head, world, parameters) in groups {
+        let mut seen =
+            HashMap::from([(load(&head.replace('@', ""), &world.replace('@', "")).hash, "")]);
+        for parameter in parameters.split('|') {
+            let [kind, name, value] =
+                parameter.trim().splitn(3, ' ').collect::<Vec<_>>().try_into().unwrap();
+            let value = if value == "C" { color } else { value };
+            let stated = format!("\"{kind} {name}\" {value}");
+            let scene = load(&head.replace('@', &stated), &world.replace('@', &stated));
+            let other = seen.insert(scene.hash, parameter);
+            assert_eq!(other, None, "{head} {world}: {parameter}");
+        }
+    }
 }
