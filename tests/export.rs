@@ -142,6 +142,9 @@ fn cameras_come_back_as_they_were() {
         let text = fs::read_to_string(&xml).unwrap();
         assert_parts(&text, &["name=\"far_clip\" value=\"1000\"", "<scale x=\"-1\"/>"]);
         let json: Value = folder.json("a.gltf");
+        // Other readers take the shape of the picture from it.
+        let aspect = json["cameras"][0]["perspective"]["aspectRatio"].as_f64().unwrap();
+        assert!((aspect * f64::from(size[1]) - f64::from(size[0])).abs() < 1e-6, "{aspect}");
         let nodes = json["nodes"].as_array().unwrap();
         let camera = nodes.iter().find(|node| !node["camera"].is_null()).unwrap();
         let matrix: [f32; 16] = serde_json::from_value(camera["matrix"].clone()).unwrap();

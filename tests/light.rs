@@ -635,25 +635,25 @@ fn every_vertex_draws_lamps_of_its_own() {
     let mut renderer = support::renderer(&scene, settings);
     let pixels = 0..(scene.film.width * scene.film.height) as usize;
     let mut before = vec![[0.0; 3]; pixels.len()];
-    let mut light = vec![[[0.0; SAMPLES]; 2]; pixels.len()];
-    for sample in 0..SAMPLES {
+    let mut light: Vec<Vec<[f64; 2]>> = vec![Vec::new(); pixels.len()];
+    for _ in 0..SAMPLES {
         renderer.render_pass(1).unwrap();
         let sums = renderer.sums().unwrap();
         for pixel in pixels.clone() {
             let now = sums.total(pixel);
             let [red, green] = [0, 1].map(|channel| now[channel] - before[pixel][channel]);
-            light[pixel][0][sample] = red;
-            light[pixel][1][sample] = green - red;
+            light[pixel].push([red, green - red]);
             before[pixel] = now;
         }
     }
     let (mut squares, mut product) = ([0.0; 2], 0.0);
     for of_pixel in &light {
-        let off = of_pixel.map(|values| {
-            let mean = values.iter().sum::<f64>() / SAMPLES as f64;
-            values.map(|value| value - mean)
-        });
-        for (first, second) in off[0].iter().zip(off[1]) {
+        let mean = |vertex: usize| {
+            of_pixel.iter().map(|values| values[vertex]).sum::<f64>() / SAMPLES as f64
+        };
+        let means = [mean(0), mean(1)];
+        for values in of_pixel {
+            let [first, second] = [0, 1].map(|vertex| values[vertex] - means[vertex]);
             squares = [squares[0] + first * first, squares[1] + second * second];
             product += first * second;
         }
