@@ -10,7 +10,13 @@ use std::{
 
 use ash::vk;
 
-use super::{Called, buffer::Buffer, device::Device, labels, set_layouts::descriptor_type};
+use super::{
+    Called,
+    buffer::Buffer,
+    device::Device,
+    labels,
+    set_layouts::{SetLayout, descriptor_type},
+};
 use crate::{
     error::{Error, Result},
     shader::bindings::{Binding, BindingTable, Kind, TexelFormat},
@@ -81,7 +87,9 @@ impl DescriptorSet {
             return Ok(*set);
         }
         let device = &self.device;
-        let layouts = [device.set_layouts.of(&device.raw, numbers)?];
+        // Alive until the set is written.
+        let layout = SetLayout::new(&device.raw, numbers)?;
+        let layouts = [layout.raw];
         let sizes = [vk::DescriptorType::STORAGE_BUFFER, vk::DescriptorType::UNIFORM_TEXEL_BUFFER]
             .map(|ty| {
                 vk::DescriptorPoolSize::default().ty(ty).descriptor_count(numbers.len() as u32)

@@ -19,7 +19,6 @@ use super::{
     instance::Instance,
     lavapipe,
     pipelines::{PipelineCache, Pipelines},
-    set_layouts::SetLayouts,
 };
 use crate::error::{Error, Result};
 
@@ -35,7 +34,7 @@ pub enum Tracer {
     Host,
 }
 
-/// A logical device with its queue, allocator, set layouts, pipelines and the driver's pipeline cache.
+/// A logical device with its queue, allocator, pipelines and the driver's pipeline cache.
 pub struct Device {
     pub(super) raw: ash::Device,
     pub(super) debug_names: Option<ext::debug_utils::Device>,
@@ -46,7 +45,6 @@ pub struct Device {
     pub(crate) tracer: Tracer,
     /// The library by which the host traces, if it does.
     pub(crate) embree: Option<Arc<Embree>>,
-    pub(super) set_layouts: SetLayouts,
     pub(super) pipeline_cache: PipelineCache,
     pub(super) pipelines: Pipelines,
     // Emptied in `drop`, before the device is destroyed.
@@ -149,7 +147,6 @@ impl Device {
             physical,
             tracer,
             embree,
-            set_layouts: SetLayouts::default(),
             pipeline_cache,
             pipelines: Pipelines::default(),
             allocator: Mutex::new(Some(allocator)),
@@ -228,7 +225,6 @@ impl Drop for Device {
         // left, and they go before the device; the queue is idle, since every submission is waited for.
         unsafe {
             drop(self.allocator().take());
-            self.set_layouts.destroy(&self.raw);
             self.pipelines.destroy(&self.raw);
             self.pipeline_cache.destroy(&self.raw);
             self.raw.destroy_device(None);

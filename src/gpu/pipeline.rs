@@ -5,7 +5,8 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::{
-    Called, descriptors::DescriptorSet, device::Device, labels, pipelines::Made, vulkan_error,
+    Called, descriptors::DescriptorSet, device::Device, labels, pipelines::Made,
+    set_layouts::SetLayout, vulkan_error,
 };
 use crate::{error::Result, shader::spirv::used_bindings, stage};
 
@@ -48,14 +49,15 @@ fn make(device: &Arc<Device>, name: &str, spirv: &[u8], constants: &[(u32, u32)]
         let of_set = all_used.iter().filter(|(other, _)| *other == set);
         of_set.map(|(_, number)| *number).collect::<Arc<[u32]>>()
     });
-    let layouts = used.iter().map(|numbers| device.set_layouts.of(&device.raw, numbers));
-    let layouts = layouts.collect::<Result<Vec<_>>>()?;
+    let sets = used.iter().map(|numbers| SetLayout::new(&device.raw, numbers));
+    let sets = sets.collect::<Result<Vec<_>>>()?;
+    let layouts: Vec<_> = sets.iter().map(|set| set.raw).collect();
     let push_constants =
         [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(128)];
     let layout_info = vk::PipelineLayoutCreateInfo::default()
         .set_layouts(&layouts)
         .push_constant_ranges(&push_constants);
-    // SAFETY: the set layouts live as long as the device.
+    // SAFETY: the device and the set layouts are alive.
     let layout = unsafe { device.raw.create_pipeline_layout(&layout_info, None) }
         .called(&format!("vkCreatePipelineLayout({name})"))?;
     let raw = compile(device, name, &words, constants, layout).inspect_err(|_| {

@@ -1,11 +1,6 @@
 //! Layouts of descriptor sets: of the buffers that a shader uses, and of no others, since a device counts
 //! all that a layout has.
 
-use std::{
-    collections::HashMap,
-    sync::{Mutex, PoisonError},
-};
-
 use ash::vk;
 
 use super::Called;
@@ -25,52 +20,37 @@ pub(super) fn descriptor_type(binding: &Binding) -> vk::DescriptorType {
     }
 }
 
-/// Layouts by the numbers of their buffers, made when they are first asked for.
-#[derive(Default)]
-pub(super) struct SetLayouts {
-    made: Mutex<HashMap<Box<[u32]>, vk::DescriptorSetLayout>>,
+/// Layout of a descriptor set. What is made from it does not need it afterwards.
+pub(super) struct SetLayout<'a> {
+    pub raw: vk::DescriptorSetLayout,
+    device: &'a ash::Device,
 }
 
-impl SetLayouts {
-    pub(super) fn of(
-        &self,
-        device: &ash::Device,
-        numbers: &[u32],
-    ) -> Result<vk::DescriptorSetLayout> {
-        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(layout) = made.get(numbers) {
-            return Ok(*layout);
-        }
-        let layout = create_layout(device, numbers)?;
-        made.insert(numbers.into(), layout);
-        Ok(layout)
-    }
-
-    /// # Safety
-    /// No pipeline layout or descriptor set made from these may be in use.
-    pub(super) unsafe fn destroy(&self, device: &ash::Device) {
-        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        for (_, layout) in made.drain() {
-            // SAFETY: promised by the caller.
-            unsafe { device.destroy_descriptor_set_layout(layout, None) };
-        }
+impl<'a> SetLayout<'a> {
+    /// Makes the layout of the buffers with these numbers.
+    pub(super) fn new(device: &'a ash::Device, numbers: &[u32]) -> Result<Self> {
+        let bindings: Vec<_> = rooms::tables()
+            .flat_map(|table| table.bindings)
+            .filter(|binding| numbers.contains(&binding.number))
+            .map(|binding| {
+                vk::DescriptorSetLayoutBinding::default()
+                    .binding(binding.number)
+                    .descriptor_type(descriptor_type(binding))
+                    .descriptor_count(1)
+                    .stage_flags(vk::ShaderStageFlags::COMPUTE)
+            })
+            .collect();
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        // SAFETY: the device is alive and `info` valid.
+        let raw = unsafe { device.create_descriptor_set_layout(&info, None) }
+            .called("vkCreateDescriptorSetLayout")?;
+        Ok(Self { raw, device })
     }
 }
 
-fn create_layout(device: &ash::Device, numbers: &[u32]) -> Result<vk::DescriptorSetLayout> {
-    let bindings: Vec<_> = rooms::tables()
-        .flat_map(|table| table.bindings)
-        .filter(|binding| numbers.contains(&binding.number))
-        .map(|binding| {
-            vk::DescriptorSetLayoutBinding::default()
-                .binding(binding.number)
-                .descriptor_type(descriptor_type(binding))
-                .descriptor_count(1)
-                .stage_flags(vk::ShaderStageFlags::COMPUTE)
-        })
-        .collect();
-    let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-    // SAFETY: the device is alive and `info` valid.
-    unsafe { device.create_descriptor_set_layout(&info, None) }
-        .called("vkCreateDescriptorSetLayout")
+impl Drop for SetLayout<'_> {
+    fn drop(&mut self) {
+        // SAFETY: pipeline layouts and sets keep what they need of it, and no set is written any more.
+        unsafe { self.device.destroy_descriptor_set_layout(self.raw, None) };
+    }
 }
