@@ -28,33 +28,17 @@ where
     [f32; N]: Deserialize<'de>,
 {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct NumberOrVisitor<const N: usize>;
-
-        impl<'de, const N: usize> Visitor<'de> for NumberOrVisitor<N>
-        where
-            [f32; N]: Deserialize<'de>,
-        {
-            type Value = NumberOr<N>;
-
-            fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-                let count = if N == 2 { "two" } else { "three" };
-                write!(formatter, "a number or an array of {count} numbers")
-            }
-
-            fn visit_f64<E>(self, number: f64) -> Result<Self::Value, E> {
-                Ok(NumberOr([number as f32; N]))
-            }
-
-            fn visit_i64<E>(self, number: i64) -> Result<Self::Value, E> {
-                Ok(NumberOr([number as f32; N]))
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, sequence: A) -> Result<Self::Value, A::Error> {
-                <[f32; N]>::deserialize(value::SeqAccessDeserializer::new(sequence)).map(NumberOr)
-            }
-        }
-
-        deserializer.deserialize_any(NumberOrVisitor)
+        let expected = if N == 2 {
+            "a number or an array of two numbers"
+        } else {
+            "a number or an array of three numbers"
+        };
+        deserializer.deserialize_any(Forms {
+            expected,
+            of_number: |number| Some(Self([number as f32; N])),
+            of_array: |numbers| Some(Self(numbers)),
+            of_texture: None,
+        })
     }
 }
 
@@ -107,61 +91,67 @@ impl<T> Textured<T> {
     }
 }
 
-/// Reader of a texture, or of a plain value of a number or of three.
-struct TexturedVisitor<T> {
-    /// Forms, for messages.
+/// Reader of a value that may be a number, an array of numbers or a texture.
+struct Forms<T, const N: usize> {
+    /// Forms that are taken, for messages.
     expected: &'static str,
     of_number: fn(f64) -> Option<T>,
-    of_array: fn([f32; 3]) -> Option<T>,
+    of_array: fn([f32; N]) -> Option<T>,
+    of_texture: Option<fn(Box<TextureEntry>) -> T>,
 }
 
-impl<T> TexturedVisitor<T> {
-    fn plain<E: de::Error>(&self, value: Option<T>, found: Unexpected) -> Result<Textured<T>, E> {
-        value.map(Textured::Uniform).ok_or_else(|| E::invalid_type(found, &self.expected))
-    }
-}
-
-impl<'de, T> Visitor<'de> for TexturedVisitor<T> {
-    type Value = Textured<T>;
+impl<'de, T, const N: usize> Visitor<'de> for Forms<T, N>
+where
+    [f32; N]: Deserialize<'de>,
+{
+    type Value = T;
 
     fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
         formatter.write_str(self.expected)
     }
 
-    fn visit_f64<E: de::Error>(self, number: f64) -> Result<Self::Value, E> {
-        self.plain((self.of_number)(number), Unexpected::Float(number))
+    fn visit_f64<E: de::Error>(self, number: f64) -> Result<T, E> {
+        let refused = || E::invalid_type(Unexpected::Float(number), &self);
+        (self.of_number)(number).ok_or_else(refused)
     }
 
-    fn visit_i64<E: de::Error>(self, number: i64) -> Result<Self::Value, E> {
-        self.plain((self.of_number)(number as f64), Unexpected::Signed(number))
+    fn visit_i64<E: de::Error>(self, number: i64) -> Result<T, E> {
+        let refused = || E::invalid_type(Unexpected::Signed(number), &self);
+        (self.of_number)(number as f64).ok_or_else(refused)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, sequence: A) -> Result<Self::Value, A::Error> {
-        let array = <[f32; 3]>::deserialize(value::SeqAccessDeserializer::new(sequence))?;
-        self.plain((self.of_array)(array), Unexpected::Seq)
+    fn visit_seq<A: SeqAccess<'de>>(self, sequence: A) -> Result<T, A::Error> {
+        let array = <[f32; N]>::deserialize(value::SeqAccessDeserializer::new(sequence))?;
+        (self.of_array)(array).ok_or_else(|| de::Error::invalid_type(Unexpected::Seq, &self))
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<T, A::Error> {
+        let Some(of_texture) = self.of_texture else {
+            return Err(de::Error::invalid_type(Unexpected::Map, &self));
+        };
         let entry = TextureEntry::deserialize(value::MapAccessDeserializer::new(map))?;
-        Ok(Textured::Texture(Box::new(entry)))
+        Ok(of_texture(Box::new(entry)))
     }
 }
 
 impl<'de> Deserialize<'de> for Textured<f32> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let expected = "a number or a table with `texture`";
-        let of_number = |number: f64| Some(number as f32);
-        deserializer.deserialize_any(TexturedVisitor { expected, of_number, of_array: |_| None })
+        deserializer.deserialize_any(Forms::<_, 3> {
+            expected: "a number or a table with `texture`",
+            of_number: |number| Some(Self::Uniform(number as f32)),
+            of_array: |_| None,
+            of_texture: Some(Self::Texture),
+        })
     }
 }
 
 impl<'de> Deserialize<'de> for Textured<[f32; 3]> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let expected = "an array of three numbers or a table with `texture`";
-        deserializer.deserialize_any(TexturedVisitor {
-            expected,
+        deserializer.deserialize_any(Forms {
+            expected: "an array of three numbers or a table with `texture`",
             of_number: |_| None,
-            of_array: Some,
+            of_array: |array| Some(Self::Uniform(array)),
+            of_texture: Some(Self::Texture),
         })
     }
 }
