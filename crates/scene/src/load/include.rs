@@ -1,7 +1,7 @@
 //! Files of other formats: as whole scenes, with the options of the command line, and by `[[include]]`,
 //! placed in another scene.
 
-use std::{collections::BTreeMap, path::Path};
+use std::collections::BTreeMap;
 
 use glam::Vec3;
 
@@ -10,11 +10,10 @@ use crate::{
     EnvironmentMap, Geometry, Lamp, Scene,
     beside::Folder,
     error::Result,
-    features,
     file::{Entry, IncludeKeys},
     files,
     import::Imported,
-    instance::{Budget, Instance},
+    instance::Instance,
     lamp::{LampKind, Spot},
     material::{Material, MaterialKind},
     mesh::Mesh,
@@ -32,9 +31,18 @@ impl Loader<'_> {
         self.check_light_group(&label, light_group.as_deref())?;
         self.check_transform(&label, scale.0, *rotate_deg, *translate)?;
         let path = self.file(file);
-        let (own_materials, mut placed, mut lamps) =
-            self.contents(&label, &path, replaced, scene)?;
-        let Scene { materials, geometry, warnings, .. } = scene;
+        let imported = self.beside(&path).import(Some(replaced))?.ok_or_else(|| {
+            self.error(format!(
+                "{label}: expected a file in .gltf, .glb, .obj, .pbrt or .xml; other meshes are objects"
+            ))
+        })?;
+        let Imported { materials: own_materials, geometry: mut placed, mut lamps, .. } = imported;
+        let Scene { materials, geometry, inputs, warnings, .. } = scene;
+        inputs.extend(imported.inputs);
+        warnings.extend(imported.warnings);
+        if imported.environment.is_some_and(|environment| !environment.is_black()) {
+            warnings.push(format!("{label}: ignored the environment of the file"));
+        }
         for name in replaced.keys() {
             let is_there = own_materials.iter().any(|material| material.name == *name);
             self.check(is_there, || {
@@ -143,44 +151,12 @@ impl Loader<'_> {
         Ok(())
     }
 
-    /// Reads materials, triangles and lamps of a file to be included: the same as of a whole scene.
-    fn contents(
+    /// Reads the file at the loader's path by its extension; none for a format that is no whole scene. A file
+    /// to be included comes with the names of its materials that others replace.
+    pub(super) fn import(
         &self,
-        label: &str,
-        path: &Path,
-        replaced: &BTreeMap<String, String>,
-        Scene { inputs, warnings, .. }: &mut Scene,
-    ) -> Result<(Vec<Material>, Geometry, Vec<Lamp>)> {
-        if !whole::is_whole(path) {
-            let imported = self.beside(path).import()?.ok_or_else(|| {
-                self.error(format!(
-                    "{label}: expected a file in .gltf, .glb, .obj, .pbrt or .xml; other meshes \
-                     are objects"
-                ))
-            })?;
-            inputs.extend(imported.inputs);
-            warnings.extend(imported.warnings);
-            if imported.environment.is_some_and(|environment| !environment.is_black()) {
-                warnings.push(format!("{label}: ignored the environment of the file"));
-            }
-            return Ok((imported.materials, imported.geometry, imported.lamps));
-        }
-        let (time, budget) = (self.options.time, Some(Budget::default()));
-        let mut mesh = Mesh::read_at(path, time, None, budget, warnings)?;
-        inputs.push(path.to_path_buf());
-        inputs.extend_from_slice(&mesh.side_files);
-        let mut ignored = mesh.ignored_in_materials(|name| replaced.contains_key(name));
-        for (index, camera) in mesh.cameras.iter().enumerate() {
-            ignored.add(features::GLTF_CAMERAS, || camera.label(index));
-        }
-        let lamps = std::mem::take(&mut mesh.lamps);
-        let (materials, geometry) = self.beside(path).place_whole(&mesh, &mut ignored, warnings)?;
-        warnings.extend(ignored.warnings(path));
-        Ok((materials, geometry, lamps))
-    }
-
-    /// Reads the file at the loader's path by its extension; none for a format that is no whole scene.
-    pub(super) fn import(&self) -> Result<Option<Imported>> {
+        replaced: Option<&BTreeMap<String, String>>,
+    ) -> Result<Option<Imported>> {
         let camera = self.options.camera.as_deref();
         let folder = || Folder::of(self.path).allowing(self.options.allow_root.as_deref());
         let mut imported = if files::extension(self.path) == "xml" {
@@ -192,7 +168,7 @@ impl Loader<'_> {
             }
             pbrt::read(self.path, folder())?
         } else if whole::is_whole(self.path) {
-            self.whole()?
+            self.whole(replaced)?
         } else {
             return Ok(None);
         };

@@ -94,7 +94,7 @@ impl Scene {
             let is_gltf = matches!(files::extension(path).as_str(), "gltf" | "glb");
             loader.check(is_gltf, || format!("--variant {name}: the option is for glTF files"))?;
         }
-        if let Some(imported) = loader.import()? {
+        if let Some(imported) = loader.import(None)? {
             return loader.imported(imported);
         }
         let extension = files::extension(path);

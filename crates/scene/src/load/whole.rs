@@ -1,6 +1,6 @@
 //! A glTF or OBJ file as a whole scene: its meshes, materials, lamps and camera in a given environment.
 
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 use glam::Vec3;
 
@@ -34,13 +34,24 @@ const FRAMING_FOV_DEG: f32 = 45.0;
 const INSIDE_FOV_DEG: f32 = 60.0;
 
 impl Loader<'_> {
-    /// Reads the mesh file at the loader's path as a whole scene.
-    pub(super) fn whole(&self) -> Result<Imported> {
+    /// Reads the mesh file at the loader's path as a whole scene, or as one to be included: no camera of it
+    /// is used, and nothing of the materials that are `replaced`.
+    pub(super) fn whole(&self, replaced: Option<&BTreeMap<String, String>>) -> Result<Imported> {
         let mut warnings = Vec::new();
-        let (variant, budget) = (self.options.variant.as_deref(), Some(Budget::default()));
+        let variant = self.options.variant.as_deref().filter(|_| replaced.is_none());
+        let budget = Some(Budget::default());
         let mesh = Mesh::read_at(self.path, self.options.time, variant, budget, &mut warnings)?;
-        let mut ignored = mesh.ignored_in_materials(|_| false);
-        let chosen = self.choose_camera(&mesh.cameras, &mut ignored)?;
+        let mut ignored = mesh.ignored_in_materials(|name| {
+            replaced.is_some_and(|replaced| replaced.contains_key(name))
+        });
+        let chosen = if replaced.is_some() {
+            for (index, camera) in mesh.cameras.iter().enumerate() {
+                ignored.add(features::GLTF_CAMERAS, || camera.label(index));
+            }
+            None
+        } else {
+            self.choose_camera(&mesh.cameras, &mut ignored)?
+        };
         let (materials, geometry) = self.place_whole(&mesh, &mut ignored, &mut warnings)?;
         warnings.extend(ignored.warnings(self.path));
         let aspect_ratio = chosen.and_then(|camera| camera.perspective.aspect_ratio);
@@ -104,7 +115,7 @@ impl Loader<'_> {
     }
 
     /// Takes the mesh as it stands, with one material more for triangles without.
-    pub(super) fn place_whole(
+    fn place_whole(
         &self,
         mesh: &Mesh,
         ignored: &mut Ignored,
@@ -155,7 +166,6 @@ impl Loader<'_> {
             dropped_of_repeated.add(dropped, triangles, || "a mesh of several nodes".to_owned());
         }
         warnings.extend(dropped_of_repeated.warnings(self.path));
-        self.check_extent("the scene", geometry.extent())?;
         let label = self.path.display().to_string();
         let is_repeated =
             |index: usize| mesh.repeated.iter().any(|repeated| repeated.material == Some(index));
