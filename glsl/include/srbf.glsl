@@ -86,8 +86,3 @@ vec3 kernel_sample(vec3 axis, float bandwidth, vec2 u) {
     return (1.0 - x) * axis + sine * cos(azimuth) * frame.tangent
         + sine * sin(azimuth) * frame.bitangent;
 }
-
-// Density of kernel_sample per steradian.
-float kernel_pdf(vec3 axis, float bandwidth, vec3 direction) {
-    return kernel_value(axis, bandwidth, direction) / kernel_integral(bandwidth);
-}

@@ -21,7 +21,6 @@ struct Output {
     float value;
     float distance;
     vec3 sampled;
-    float pdf;
 };
 
 Output answer(Input given) {
@@ -34,7 +33,6 @@ Output answer(Input given) {
     result.value = kernel_value(given.axis, given.bandwidth, given.direction);
     result.distance = kernel_sample_distance(given.bandwidth, given.u.x);
     result.sampled = kernel_sample(given.axis, given.bandwidth, given.u);
-    result.pdf = kernel_pdf(given.axis, given.bandwidth, given.direction);
     return result;
 }
 
