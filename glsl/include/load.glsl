@@ -1,5 +1,6 @@
 // Loads rays, hits, shadow rays, materials and paths through texel buffers: on lavapipe a texel of four
-// words costs a fraction of four loads from a storage buffer (docs/traversal.md).
+// words costs a fraction of four loads from a storage buffer (docs/traversal.md). Compilers take texels for
+// constant: a pass may write an element that it has loaded only if what it writes depends on that.
 
 #include "layout.glsl"
 

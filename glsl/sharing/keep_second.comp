@@ -10,7 +10,7 @@
 #include "sharing/cohort.glsl"
 #include "wave.glsl"
 
-WRITES(paths)
+UPDATES(paths)
 WRITES(second_vertices)
 WRITES(second_lights)
 
@@ -41,7 +41,7 @@ void keep_second(uint path) {
     // The path has weighed its throughput by 1 / density: the ratio of the two densities.
     second_vertices[path] = SecondVertex(
         hit.position, hit.geometric_normal, hit.shading_normal, -direction, state.throughput,
-        state.radiance, material.reflectance, material.alpha, material.ior, material.anisotropy,
+        paths[path].radiance, material.reflectance, material.alpha, material.ior, material.anisotropy,
         hit.material, strongest, pdf * (strongest / most));
     // All else is written before it is read.
     second_lights[path].shared_light = vec3(0.0);

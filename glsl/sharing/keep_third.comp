@@ -8,7 +8,7 @@
 #include "load.glsl"
 #include "wave.glsl"
 
-WRITES(paths)
+UPDATES(paths)
 LOADS(SecondVertex, load_second_vertex, second_vertex_texels)
 WRITES(second_lights)
 
@@ -19,7 +19,7 @@ void keep_third(uint path) {
     }
     Material material = load_surface(path, second.material);
     Ray ray = load_ray(path);
-    vec3 direct = load_path_state(path).radiance;
+    vec3 direct = paths[path].radiance;
     if (is_diffuse(material)) {
         second_lights[path].shared_light = direct;
     } else if (ray.is_active != 0u) {

@@ -3,7 +3,6 @@
 // is hidden from it. The weight is 0 if the own first vertex does not see it.
 #version 460
 
-#include "load.glsl"
 #include "sharing/cohort.glsl"
 #include "wave.glsl"
 
