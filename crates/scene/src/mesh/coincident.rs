@@ -45,7 +45,7 @@ impl Mesh {
         let (mut moved, mut unculled, mut stacked) = (Vec::new(), 0, 0);
         for group in groups.chunk_by(|a, b| a.place == b.place) {
             let first = material(group[0].index);
-            if group.len() < 2 || group.iter().all(|other| material(other.index) == first) {
+            if group.iter().all(|other| material(other.index) == first) {
                 continue;
             }
             let is_pair = group.iter().any(|other| other.is_odd != group[0].is_odd);

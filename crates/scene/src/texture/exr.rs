@@ -82,11 +82,6 @@ pub(crate) fn decode<T: Zeroable + 'static, N: Default + 'static>(
         let size = [header.layer_size.width() as u64, header.layer_size.height() as u64];
         check_size(size, header.channels.bytes_per_pixel as u64)?;
     }
-    for channel in &header.channels.list {
-        if channel.sampling != Vec2(1, 1) {
-            return Err(format!("channel {} is subsampled, which is not read", channel.name));
-        }
-    }
     let channels = exr::prelude::read().no_deep_data().largest_resolution_level();
     let channels = channels.specific_channels();
     let read = Cursor::new(bytes);
