@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use std::f32::consts::FRAC_PI_2;
+use std::{collections::HashSet, f32::consts::FRAC_PI_2};
 
 use fenestra_scene::{
     Scene,
@@ -278,6 +278,126 @@ fn glass_unlit_and_specular_glossiness_materials_are_mapped() {
     assert!((luminance(normal) - 0.5).abs() < 0.02, "{normal}");
 }
 
+/// Each member, alone in place of `@`, makes a scene that no other member of its object makes; those after
+/// `;` state defaults of the format, and change nothing.
+#[test]
+fn every_member_of_a_gltf_file_counts() {
+    let extension =
+        |name: &str, others: &str| format!("\"extensions\": {{\"{name}\": {{{others}@}}}}");
+    let metal = "\"pbrMetallicRoughness\": {\"metallicFactor\": 1}, ";
+    let light = |kind: &str| format!("\"type\": \"{kind}\"@");
+    let groups = [
+        (
+            "material",
+            "\"pbrMetallicRoughness\": {\"extras\": 0@}".to_owned(),
+            "baseColorFactor [0.5,1,1,1]|metallicFactor 0.3|roughnessFactor 0.3;\
+             baseColorFactor [1,1,1,1]|metallicFactor 1|roughnessFactor 1",
+        ),
+        (
+            "material",
+            "\"extras\": 0@".to_owned(),
+            "emissiveFactor [1,0,0];emissiveFactor [0,0,0]|doubleSided false|alphaMode \"OPAQUE\"",
+        ),
+        (
+            "material",
+            "\"pbrMetallicRoughness\": {\"baseColorFactor\": [1, 1, 1, 0.4]}, \"alphaMode\": \"MASK\"@"
+                .to_owned(),
+            "alphaCutoff 0.3;alphaCutoff 0.5",
+        ),
+        ("material", extension("KHR_materials_ior", "\"extras\": 0"), "ior 1.7;ior 1.5"),
+        (
+            "material",
+            extension("KHR_materials_specular", "\"extras\": 0"),
+            "specularFactor 0.3|specularColorFactor [0.5,1,1];specularFactor 1|specularColorFactor [1,1,1]",
+        ),
+        (
+            "material",
+            extension("KHR_materials_clearcoat", "\"clearcoatFactor\": 0.5"),
+            "clearcoatRoughnessFactor 0.3;clearcoatRoughnessFactor 0",
+        ),
+        (
+            "material",
+            extension("KHR_materials_sheen", "\"sheenColorFactor\": [1, 0, 0]"),
+            "sheenRoughnessFactor 0.3;sheenRoughnessFactor 0",
+        ),
+        (
+            "material",
+            metal.to_owned() + &extension("KHR_materials_anisotropy", "\"anisotropyStrength\": 0.5"),
+            "anisotropyRotation 0.3;anisotropyRotation 0",
+        ),
+        (
+            "material",
+            "\"emissiveFactor\": [1, 0, 0], ".to_owned()
+                + &extension("KHR_materials_emissive_strength", "\"extras\": 0"),
+            "emissiveStrength 2;emissiveStrength 1",
+        ),
+        (
+            "material",
+            extension("KHR_materials_pbrSpecularGlossiness", "\"extras\": 0"),
+            "specularFactor [0.5,1,1];specularFactor [1,1,1]",
+        ),
+        (
+            "material",
+            extension("KHR_materials_pbrSpecularGlossiness", "\"specularFactor\": [0.2, 0.2, 0.2]"),
+            "diffuseFactor [0.5,1,1,1]|glossinessFactor 0.3;diffuseFactor [1,1,1,1]|glossinessFactor 1",
+        ),
+        (
+            "material",
+            metal.replace('1', "0")
+                + &extension("KHR_materials_transmission", "\"transmissionFactor\": 1").replace(
+                    '@',
+                    "}, \"KHR_materials_volume\": {\"thicknessFactor\": 1, \
+                     \"attenuationColor\": [0.5, 1, 1]@",
+                ),
+            "attenuationDistance 3|attenuationDistance 4",
+        ),
+        ("light", light("point"), "color [1,0,0]|intensity 3;color [1,1,1]|intensity 1"),
+        ("light", light("directional"), "color [1,0,0]|intensity 3;color [1,1,1]|intensity 1"),
+        (
+            "light",
+            light("spot").replace('@', ", \"spot\": {\"extras\": 0@}"),
+            "innerConeAngle 0.3|outerConeAngle 1;innerConeAngle 0|outerConeAngle 0.7853981633974483",
+        ),
+        (
+            "camera",
+            "\"yfov\": 0.5, \"znear\": 0.1@".to_owned(),
+            "aspectRatio 0.5|aspectRatio 2;zfar 9",
+        ),
+    ];
+    let folder = Folder::new();
+    for (part, object, members) in groups {
+        let read = |member: &str| {
+            let (name, value) = member.trim().split_once(' ').unwrap_or_default();
+            let stated = format!(", \"{name}\": {value}");
+            let own = object.replace('@', if name.is_empty() { "" } else { &stated });
+            let own =
+                |of: &str, other: &str| if of == part { own.clone() } else { other.to_owned() };
+            let light = own("light", "\"type\": \"point\"");
+            let camera = own("camera", "\"yfov\": 1, \"znear\": 0.1");
+            let nodes =
+                r#"{"mesh": 0, "camera": 0, "extensions": {"KHR_lights_punctual": {"light": 0}}}"#;
+            let rest = format!(
+                ", \"extensions\": {{\"KHR_lights_punctual\": {{\"lights\": [{{{light}}}]}}}}, \
+                \"cameras\": [{{\"type\": \"perspective\", \"perspective\": {{{camera}}}}}]"
+            );
+            let material = format!("{{{}}}", own("material", ""));
+            let text = gltf(nodes, &material, ", \"material\": 0", &rest);
+            Scene::load(&folder.write("a.gltf", text)).expect(member)
+        };
+        let (members, defaults) = members.split_once(';').unwrap_or((members, ""));
+        let plain = read("");
+        for default in defaults.split('|') {
+            let stated = read(default);
+            assert_eq!(stated.warnings, plain.warnings, "{object}: {default}");
+            assert_eq!(stated.hash, plain.hash, "{object}: {default}");
+        }
+        let mut seen = HashSet::from([plain.hash]);
+        for member in members.split('|') {
+            assert!(seen.insert(read(member).hash), "{object}: {member}");
+        }
+    }
+}
+
 #[test]
 fn images_in_buffers_are_read_and_broken_ones_are_warnings() {
     let folder = Folder::new();
@@ -483,15 +603,20 @@ fn faces_back_to_back_look_their_own_way() {
 }
 
 /// Steps by which triangles of different materials stand above z = 0, and warnings. The first two materials
-/// are opaque, the third lets half the light through, the fourth is glass.
-fn heights(triangles: &[[u8; 3]], is_culled: bool) -> (Vec<f32>, Vec<String>) {
+/// are opaque, the third lets half the light through, the fourth is glass. As many as `sharing` after the
+/// first triangle have the material of the one before.
+fn heights(triangles: &[[u8; 3]], is_culled: bool, sharing: usize) -> (Vec<f32>, Vec<String>) {
     let folder = Folder::new();
     let corners = [5.0, 0.0, 0.0, 6.0, 0.0, 0.0, 5.0, 1.0, 0.0, 5.0, 0.0, -0.0];
     let bytes = [floats(&corners), triangles.concat()].concat();
     let all =
         |of: &dyn Fn(usize) -> String| (0..triangles.len()).map(of).collect::<Vec<_>>().join(", ");
     let primitives = all(&|at| {
-        format!(r#"{{"attributes": {{"POSITION": 0}}, "indices": {}, "material": {at}}}"#, at + 1)
+        format!(
+            r#"{{"attributes": {{"POSITION": 0}}, "indices": {}, "material": {}}}"#,
+            at + 1,
+            at.saturating_sub(sharing)
+        )
     });
     let indices = all(&|at| {
         let first = 3 * at;
@@ -534,16 +659,19 @@ fn heights(triangles: &[[u8; 3]], is_culled: bool) -> (Vec<f32>, Vec<String>) {
 #[test]
 fn faces_back_to_back_part_and_layers_rise() {
     let (front, back) = ([0, 1, 2], [2, 1, 3]);
-    assert_eq!(heights(&[front, back], true), (vec![1.0, -1.0], vec![]));
-    let (found, warnings) = heights(&[front, back], false);
+    assert_eq!(heights(&[front, back], true, 0), (vec![1.0, -1.0], vec![]));
+    let (found, warnings) = heights(&[front, back], false, 0);
     assert_eq!(found, [1.0, -1.0]);
     assert!(warnings[0].contains("1 pairs of triangles lie back to back"), "{warnings:?}");
-    let (found, warnings) = heights(&[front, [1, 2, 3]], true);
+    let (found, warnings) = heights(&[front, [1, 2, 3]], true, 0);
     assert_eq!(found, [0.0, 0.0]);
     assert!(warnings[0].contains("1 triangles lie on others"), "{warnings:?}");
-    assert_eq!(heights(&[front, back, front, back], true).0, [1.0, -1.0, 2.0, -2.0]);
+    assert_eq!(heights(&[front, back, front, back], true, 0).0, [1.0, -1.0, 2.0, -2.0]);
+    // One material, beside another elsewhere.
+    let shared = heights(&[front, back, [0, 3, 1]], false, 1);
+    assert_eq!(shared, (vec![0.0; 3], vec![]));
     // Another place, and no area.
-    assert_eq!(heights(&[front, [0, 3, 1]], false), (vec![0.0, 0.0], vec![]));
+    assert_eq!(heights(&[front, [0, 3, 1]], false, 0), (vec![0.0, 0.0], vec![]));
 }
 
 #[test]
@@ -895,6 +1023,17 @@ fn what_the_format_leaves_open_is_completed() {
     );
     let zeros = zeros.replace(r#""POSITION": 0"#, r#""POSITION": 0, "NORMAL": 1"#);
     assert_eq!(load(&zeros).geometry.normals, [[0.0; 3]; 3]);
+    // Attributes that a part has not, after one that has them.
+    let parts = whole.replace(
+        r#"{"attributes": {"POSITION": 0}"#,
+        r#"{"attributes": {"POSITION": 0, "NORMAL": 0, "COLOR_0": 0}}, {"attributes": {"POSITION": 0}"#,
+    );
+    let parts = Mesh::read(&folder.write("a.gltf", parts), &mut Vec::new()).unwrap();
+    assert_eq!(
+        parts.normals[1..],
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0; 3], [0.0; 3], [0.0; 3]]
+    );
+    assert_eq!(parts.colors[2..], [[0.0, 1.0, 0.0, 1.0], [1.0; 4], [1.0; 4], [1.0; 4]]);
     let hidden = r#"{"mesh": 0}, {"mesh": 0, "children": [2], "extensions":
         {"KHR_node_visibility": {"visible": false}}}, {"mesh": 0}"#;
     let hidden = gltf(hidden, "", "", "");
@@ -1106,10 +1245,14 @@ fn mtl_materials_become_surfaces() {
     assert!(ior == 1.4 && close(transmittance, [0.9, 1.0, 1.0]), "{transmittance}");
     let keys = "Kd 0.5 1 1\nmap_Kd maps/leaf green.png\nd 0.2\nKs 1 1 1\nillum 7";
     let pane = mtl_material(&folder, keys).0;
+    let MaterialKind::ThinDielectric { transmittance, .. } = pane.kind else { panic!("{pane:?}") };
+    assert_eq!(transmittance, Vec3::ONE);
     let image = pane.surface.color.unwrap();
     assert!(close(image.scale.into(), [0.1, 0.2, 0.2]) && close(image.bias.into(), [0.8; 3]));
     let filtered = mtl_material(&folder, &format!("{keys}\nTf 0.1 0.2 0.3")).0;
     assert!(filtered.surface.color.is_none(), "{filtered:?}");
+    let (_, warnings) = mtl_material(&folder, "Kd spectral a.rfl");
+    assert!(warnings[0].contains("`Kd` that is no colour"), "{warnings:?}");
     let reflectance = Vec3::new(0.9, 0.8, 0.7);
     let mirror = kind("Kd 0 0 0\nKs 0.9 0.8 0.7\nillum 3");
     assert!(matches!(mirror, MaterialKind::Mirror { reflectance: found } if found == reflectance));

@@ -394,6 +394,12 @@ fn models_become_materials() {
     );
     assert!(matches!(mixed.kind, MaterialKind::Dielectric { .. }));
     assert!(warnings[0].contains("lesser part of `blendbsdf`"), "{warnings:?}");
+    let (cut, _) = material(
+        r#"<bsdf type="mask"><float name="opacity" value="0.25"/><bsdf type="mask"><texture name="opacity"
+        type="checkerboard"/><bsdf type="diffuse"/></bsdf></bsdf>"#,
+    );
+    assert_eq!(cut.surface.opacity.factor, 0.25);
+    assert!(cut.surface.opacity.texture.is_some());
     // Half 0.8, a quarter 0.4, and a quarter of all light; half 0.8, and half 0.82 of which half is metal.
     let three = r#"<bsdf type="mixturebsdf"><string name="weights" value="0.5, 0.25, 0.25"/>
         <bsdf type="diffuse"><rgb name="reflectance" value="0.8"/></bsdf>
@@ -411,7 +417,10 @@ fn models_become_materials() {
         let reflected = base_color.x * (1.0 - metallic) * 0.96 + 0.04 * (1.0 - metallic);
         let reflected = reflected + base_color.x * metallic;
         assert!((reflected - expected).abs() < 0.02, "{base_color} {metallic}");
-        assert!(warnings[0].contains("gloss of `blendbsdf`"), "{warnings:?}");
+        assert!(
+            matches!(&warnings[..], [one] if one.contains("gloss of `blendbsdf`")),
+            "{warnings:?}"
+        );
     }
     let (phong, warnings) = material(
         r#"<bsdf type="phong"><float name="exponent" value="50"/>
@@ -1670,6 +1679,15 @@ fn bad_files_end_in_one_error_with_file_and_line() {
         (bsdf("<string name=\"reflectance\" value=\"red\"/>"), "expected a colour, found `string`"),
         (bsdf("<rgb name=\"reflectance\" value=\"2 2 2\"/>"), "expected 0 to 1"),
         (bsdf("<rgb name=\"reflectance\" value=\"$mood\"/>"), "`$mood` has no value"),
+        (
+            "<emitter type=\"constant\"><blackbody name=\"radiance\" temperature=\"0.5\"/></emitter>"
+                .to_owned(),
+            "expected 1 to 1e6 kelvins, found 0.5",
+        ),
+        (
+            bsdf("").replace("diffuse\">", "plastic\"><float name=\"int_ior\" value=\"4.1\"/>"),
+            "int_ior over ext_ior: expected at most 4, found 4.0",
+        ),
         (shape("<integer name=\"flip_normals\" value=\"1\"/>"), "expected an element boolean"),
         (
             "<shape type=\"ply\"><string name=\"filename\" value=\"a.xml\"/></shape>".to_owned(),
@@ -1677,6 +1695,13 @@ fn bad_files_end_in_one_error_with_file_and_line() {
         ),
         ("<include filename=\"absent.xml\"/>".to_owned(), "the file `absent.xml` is not there"),
         ("<include filename=\"a.xml\"/>".to_owned(), "`a.xml` includes itself"),
+        (
+            shape(&format!(
+                "<transform name=\"to_world\">{}</transform>",
+                "<scale value=\"1e38\"/>".repeat(9)
+            )),
+            "expected finite numbers in the product of its elements",
+        ),
         (shape(&deep), "nested deeper than 32"),
         (
             "<bsdf type=\"twosided\" id=\"a\"><ref id=\"a\"/></bsdf>".to_owned()
@@ -1695,6 +1720,10 @@ fn bad_files_end_in_one_error_with_file_and_line() {
         assert!(message.contains(expected), "expected {expected:?} in {message:?}");
         assert!(message.contains("a.xml:6:") || content == "<shape", "{message}");
     }
+    let folder = Folder::new();
+    let room =
+        Scene::load(&folder.write("a.xml", "<room version=\"3.0.0\"/>")).unwrap_err().to_string();
+    assert!(room.contains("a.xml:1:1: expected the element `scene` of a Mitsuba file"), "{room}");
 }
 
 #[test]
@@ -2005,7 +2034,8 @@ fn a_real_environment_has_the_radiance_of_mitsuba() {
     }
 }
 
-/// Each parameter, alone in place of `@`, makes a scene that no other parameter of its value makes.
+/// Each parameter, alone in place of `@`, makes a scene that no other parameter of its value makes; those
+/// after `;` state defaults of Mitsuba, and change nothing.
 #[test]
 fn every_parameter_counts_and_none_for_another() {
     let surface = |kind: &str| {
@@ -2026,7 +2056,8 @@ fn every_parameter_counts_and_none_for_another() {
         ),
         (
             r#"<sensor type="perspective"><film type="hdrfilm">@</film></sensor>"#.to_owned(),
-            "integer width 500|integer height 500|integer crop_width 500|integer crop_height 500",
+            "integer width 500|integer height 500|integer crop_width 500|integer crop_height 500;\
+             integer width 768|integer height 576|integer crop_offset_x 0",
         ),
         (
             r#"<sensor type="perspective"><film type="hdrfilm"><integer name="crop_width" value="500"/>
@@ -2034,82 +2065,111 @@ fn every_parameter_counts_and_none_for_another() {
                 .to_owned(),
             "integer crop_offset_x 30|integer crop_offset_y 30",
         ),
-        (surface("diffuse"), "float reflectance .3"),
+        (surface("diffuse"), "float reflectance .3;float reflectance .5"),
         (
             surface("roughconductor"),
             "float alpha .3|float eta .3|float k .3|string material Ag|\
-             float specular_reflectance .3|string distribution ggx",
+             float specular_reflectance .3|string distribution ggx;float alpha .1|\
+             float specular_reflectance 1|string distribution beckmann|float ext_eta 1.000277",
         ),
         (
             surface("conductor").replace('@', "<string name=\"material\" value=\"Ag\"/>@"),
-            "float ext_eta 1.3|float specular_reflectance .3",
+            "float ext_eta 1.3|float specular_reflectance .3;float specular_reflectance 1",
         ),
         (
             surface("roughplastic"),
             "float alpha .3|float int_ior 1.3|float ext_ior 1.3|float diffuse_reflectance .3|\
-             boolean nonlinear true|string distribution ggx",
+             boolean nonlinear true|string distribution ggx;float alpha .1|float int_ior 1.49|\
+             float ext_ior 1.000277|float diffuse_reflectance .5|float specular_reflectance 1|\
+             boolean nonlinear false|string distribution beckmann",
         ),
         (
             surface("plastic"),
-            "float int_ior 1.3|float ext_ior 1.3|float diffuse_reflectance .3|boolean nonlinear true",
+            "float int_ior 1.3|float ext_ior 1.3|float diffuse_reflectance .3|boolean nonlinear true;\
+             string int_ior polypropylene|string ext_ior air|\
+             float diffuse_reflectance .5|boolean nonlinear false",
         ),
         (
             surface("roughdielectric"),
             "float alpha .3|float int_ior 1.3|float ext_ior 1.3|float specular_reflectance .3|\
-             float specular_transmittance .3|string distribution ggx",
+             float specular_transmittance .3|string distribution ggx;float alpha .1|float int_ior 1.5046|\
+             string ext_ior air|float specular_reflectance 1|float specular_transmittance 1",
         ),
         (
             surface("thindielectric"),
             "float int_ior 1.3|float ext_ior 1.3|float specular_reflectance .3|\
-             float specular_transmittance .3",
+             float specular_transmittance .3;string int_ior bk7|float specular_transmittance 1",
         ),
         (
             surface("principled"),
             "float base_color .3|float roughness .3|float metallic .3|float anisotropic .3|\
-             float clearcoat .3|float eta 1.3|float specular .3|float spec_trans .6",
+             float clearcoat .3|float eta 1.3|float specular .3|float spec_trans .6;float base_color .5|\
+             float roughness .5|float metallic 0|float anisotropic 0|float clearcoat 0|float specular .5|\
+             float spec_trans 0|float spec_tint 0|float sheen 0|float sheen_tint 0|float flatness 0",
         ),
-        (surface("principledthin"), "float base_color .3|float diff_trans .3"),
-        (surface("mask").replace('@', "@<bsdf type=\"diffuse\"/>"), "float opacity .3"),
+        (
+            surface("principledthin"),
+            "float base_color .3|float diff_trans .3;float base_color .5|float roughness .5|\
+             float diff_trans 0",
+        ),
+        (surface("mask").replace('@', "@<bsdf type=\"diffuse\"/>"), "float opacity .3;float opacity .5"),
         (
             surface("diffuse").replace("<bsdf type=\"diffuse\">@</bsdf>", masks),
             "float opacity .3|float opacity .6",
         ),
         (
             surface("diffuse").replace("<bsdf type=\"diffuse\">@</bsdf>", medium),
-            "float sigma_t .3|float scale .5",
+            "float sigma_t .3|float scale .5;float scale 1",
         ),
-        (emitter("point"), "point position 1,0,0|rgb intensity 1,2,3"),
-        (emitter("spot"), "rgb intensity 1,2,3|float cutoff_angle 10|float beam_width 10"),
-        (emitter("directional"), "vector direction 1,0,0|rgb irradiance 1,2,3"),
-        (emitter("constant"), "rgb radiance 1,2,3"),
+        (emitter("point"), "point position 1,0,0|rgb intensity 1,2,3;point position 0,0,0|float intensity 1"),
+        (
+            emitter("spot"),
+            "rgb intensity 1,2,3|float cutoff_angle 10|float beam_width 10;float cutoff_angle 20|\
+             float beam_width 15",
+        ),
+        (emitter("directional"), "vector direction 1,0,0|rgb irradiance 1,2,3;vector direction 0,0,1"),
+        (emitter("constant"), "rgb radiance 1,2,3;float radiance 1"),
         (
             shape("rectangle").replace('@', "<emitter type=\"area\">@</emitter>"),
             "rgb radiance 1,2,3|float radiance 2",
         ),
-        (shape("sphere"), "float radius 2|point center 0,0,2|boolean flip_normals true"),
+        (
+            shape("sphere"),
+            "float radius 2|point center 0,0,2|boolean flip_normals true;float radius 1|\
+             point center 0,0,0",
+        ),
         (
             shape("cylinder"),
-            "float radius 2|point p0 0,0,.5|point p1 0,0,.5|boolean flip_normals true",
+            "float radius 2|point p0 0,0,.5|point p1 0,0,.5|boolean flip_normals true;float radius 1|\
+             point p0 0,0,0|point p1 0,0,1|boolean flip_normals false",
         ),
         (shape("disk"), "boolean flip_normals true"),
         (
             surface("diffuse")
                 .replace('@', "<texture name=\"reflectance\" type=\"checkerboard\">@</texture>"),
             "float color0 .3|float color1 .3|float uscale .3|float vscale .3|float uoffset .3|\
-             float voffset .3|float uvscale .3",
+             float voffset .3|float uvscale .3;float color0 .4|float color1 .2",
         ),
     ];
     for (text, parameters) in groups {
         let folder = Folder::new();
-        let hash = |stated: &str| {
-            loaded(&folder.write("a.xml", document(&text.replace('@', stated)))).hash
+        let read = |parameter: &str| {
+            let stated = parameter.trim().splitn(3, ' ').collect::<Vec<_>>();
+            let stated = <[_; 3]>::try_from(stated).map_or(String::new(), |[tag, name, value]| {
+                format!("<{tag} name=\"{name}\" value=\"{value}\"/>")
+            });
+            loaded(&folder.write("a.xml", document(&text.replace('@', &stated))))
         };
-        let mut seen = HashMap::from([(hash(""), "")]);
+        let (parameters, defaults) = parameters.split_once(';').unwrap_or((parameters, ""));
+        let plain = read("");
+        for default in defaults.split('|') {
+            let stated = read(default);
+            assert_eq!(stated.warnings, plain.warnings, "{text}: {default}");
+            assert_eq!(stated.hash, plain.hash, "{text}: {default}");
+        }
+        let mut seen = HashMap::from([(plain.hash, "")]);
         for parameter in parameters.split('|') {
-            let [tag, name, value] =
-                parameter.trim().splitn(3, ' ').collect::<Vec<_>>().try_into().unwrap();
-            let own = hash(&format!("<{tag} name=\"{name}\" value=\"{value}\"/>"));
-            assert_eq!(seen.insert(own, parameter), None, "{text}: {parameter}");
+            assert_eq!(seen.insert(read(parameter).hash, parameter), None, "{text}: {parameter}");
         }
     }
 }

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 use std::{
-    collections::HashMap,
+    collections::{HashMap, HashSet},
     f32::consts::{FRAC_PI_2, PI},
     path::Path,
 };
@@ -318,8 +318,11 @@ fn quadrics_and_patches_face_outward() {
         let scene = world(&format!("Shape {shape}"));
         assert_eq!(warnings(&scene), [DARK]);
         let positions = positions(&scene);
-        let mut sum = 0.0;
+        let (mut sum, mut edges) = (0.0, HashSet::new());
         for (index, triangle) in scene.geometry.triangles.iter().enumerate() {
+            let [a, b, c] = *triangle;
+            let are_new = [[a, b], [b, c], [c, a]].map(|edge| edges.insert(edge));
+            assert_eq!(are_new, [true; 3], "{shape}: triangles overlap");
             let [a, b, c] = triangle.map(|at| positions[at as usize]);
             sum += 0.5 * (b - a).cross(c - a).length();
             let centre = (a + b + c) / 3.0;
@@ -342,14 +345,14 @@ fn quadrics_and_patches_face_outward() {
         let expected = Vec3::new(cosine, sine, 4.0 * v - 1.0);
         assert!(at.abs_diff_eq(expected, 1e-5), "{at} {u} {v}");
     }
-    let curved = world("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]");
+    let curved = world("Shape \"bilinearmesh\" \"point3 P\" [1 1 1 2 1 2 1 2 2 2 2 4]");
     assert_eq!(curved.geometry.triangles.len(), 512);
     let Geometry { normals, uvs, .. } = &curved.geometry;
     for (at, (normal, uv)) in positions(&curved).iter().zip(normals.iter().zip(&uvs[0])) {
         let expected = Vec3::new(-at.y, -at.x, 1.0).normalize();
         assert!((at.z - at.x * at.y).abs() < 1e-5, "a saddle, not {at}");
         assert!(Vec3::from(*normal).abs_diff_eq(expected, 1e-5), "{at}: {normal:?}");
-        assert!(at.truncate().abs_diff_eq(Vec2::from(*uv), 1e-5), "{at}: {uv:?}");
+        assert!((at.truncate() - 1.0).abs_diff_eq(Vec2::from(*uv), 1e-5), "{at}: {uv:?}");
     }
     let flat = world("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 1 1 0 2 1 0]");
     assert_eq!(flat.geometry.triangles.len(), 2);
@@ -606,6 +609,10 @@ fn mixtures_and_surfaces_that_are_not_there() {
     assert_eq!(scene.geometry.triangles.len(), 1);
     assert_eq!(scene.materials.len(), 1);
     assert_eq!(scene.materials[0].surface.opacity.factor, 0.25);
+    // Mixtures one after another are not mixtures of mixtures.
+    let mix = "Material \"mix\" \"string materials\" [\"red\" \"none\"] \"float amount\"";
+    let many = (1..100).map(|share| format!("{mix} 0.{share:02} {TRIANGLE}"));
+    assert_eq!(world(&(text.clone() + &many.collect::<String>())).materials.len(), 100);
     assert_eq!(
         warnings(&scene),
         ["ignored area lights without a surface (line 7): left out, as in pbrt", DARK]
@@ -1447,6 +1454,11 @@ fn bad_text_is_one_error_with_file_line_and_column() {
             "expected an integer",
         ),
         ("Shpe \"sphere\"", "room.pbrt:3:1: unknown directive `Shpe`"),
+        ("AreaLightSource \"blob\" Shape \"sphere\"", "expected a diffuse light"),
+        (
+            "Material \"mix\" \"string materials\" [\"a\" \"b\" \"c\"] Shape \"sphere\"",
+            "expected two names of `materials`",
+        ),
         ("[", "expected a directive"),
         ("Translate 1 2", "expected 3 numbers, found `the end of the file`"),
         ("Translate 1 x 2", "room.pbrt:3:13: Translate: expected 3 numbers, found `x`"),
@@ -1741,7 +1753,8 @@ fn real_scenes_load_whole() {
     assert!(warnings(&plain)[1].contains("wood5.tga: cannot read"), "{:?}", plain.warnings);
 }
 
-/// Each parameter, alone in place of `@`, makes a scene that no other parameter of its value makes.
+/// Each parameter, alone in place of `@`, makes a scene that no other parameter of its value makes; those
+/// after `;` state defaults of pbrt, and change nothing.
 #[test]
 fn every_parameter_counts_and_none_for_another() {
     let lit = format!("LightSource \"point\" {TRIANGLE}");
@@ -1758,36 +1771,52 @@ fn every_parameter_counts_and_none_for_another() {
             r#"Camera "perspective" "float lensradius" 0.1 @"#,
             lit.clone(),
             "float fov 50|float screenwindow [-1 1 -1 3]|float shutteropen 0.5|float shutterclose 0.25|\
-             float focaldistance 3",
+             float focaldistance 3;float fov 90|float shutteropen 0|float shutterclose 1|\
+             float focaldistance 1e6",
         ),
         (
             r#"Film "rgb" @ Camera "perspective""#,
             lit,
             "integer xresolution 64|integer yresolution 64|float iso 50|float whitebalance 4000|\
-             integer pixelbounds [0 8 0 9]|float cropwindow [0 0.5 0 0.25]",
+             integer pixelbounds [0 8 0 9]|float cropwindow [0 0.5 0 0.25];integer xresolution 1280|\
+             integer yresolution 720|float iso 100|float cropwindow [0 1 0 1]|\
+             string sensor \"cie1931\"",
+        ),
+        (
+            r#"PixelFilter "gaussian" @ Camera "perspective""#,
+            format!("LightSource \"point\" {TRIANGLE}"),
+            ";float xradius 1.5|float yradius 1.5|float sigma .5",
         ),
         (
             MIRRORED,
             light("distant"),
-            "rgb L C|float scale 2|float illuminance 3|point3 from [1 0 0]|point3 to [1 0 0]",
+            "rgb L C|float scale 2|float illuminance 3|point3 from [1 0 0]|point3 to [1 0 0];\
+             float scale 1|point3 from [0 0 0]|point3 to [0 0 1]",
         ),
-        (MIRRORED, light("point"), "rgb I C|float scale 2|float power 2|point3 from [1 0 0]"),
+        (
+            MIRRORED,
+            light("point"),
+            "rgb I C|float scale 2|float power 2|point3 from [1 0 0];point3 from [0 0 0]",
+        ),
         (
             MIRRORED,
             light("spot"),
             "rgb I C|float scale 2|float power 2|point3 from [1 0 0]|point3 to [1 0 0]|\
-             float coneangle 20|float conedeltaangle 20",
+             float coneangle 20|float conedeltaangle 20;float coneangle 30|float conedeltaangle 5|\
+             point3 from [0 0 0]|point3 to [0 0 1]",
         ),
         (MIRRORED, light("infinite"), "rgb L C|float scale 2|float illuminance 2"),
         (
             MIRRORED,
             format!("AreaLightSource \"diffuse\" @ {TRIANGLE}"),
-            "rgb L C|float scale 2|float power 2|bool twosided true",
+            "rgb L C|float scale 2|float power 2|bool twosided true;float scale 1|bool twosided false",
         ),
         (
             MIRRORED,
             surface("\"coateddiffuse\""),
-            "rgb reflectance C|float roughness .2|float eta 1.8",
+            "rgb reflectance C|float roughness .2|float eta 1.8;rgb reflectance [.5 .5 .5]|float roughness 0|\
+             float eta 1.5|bool remaproughness true|float g 0|float thickness .01|\
+             integer maxdepth 10|integer nsamples 1",
         ),
         (
             MIRRORED,
@@ -1797,65 +1826,86 @@ fn every_parameter_counts_and_none_for_another() {
         (
             MIRRORED,
             surface("\"conductor\""),
-            "float roughness .2|float uroughness .2|float vroughness .2|rgb eta C|rgb k C|rgb reflectance C",
+            "float roughness .2|float uroughness .2|float vroughness .2|rgb eta C|rgb k C|\
+             rgb reflectance C;float roughness 0|spectrum eta \"metal-Cu-eta\"|spectrum k \"metal-Cu-k\"",
         ),
         (
             MIRRORED,
             surface("\"coatedconductor\""),
             "float conductor.roughness .2|float interface.roughness .2|rgb conductor.eta C|\
-             rgb conductor.k C|float interface.eta 1.8|rgb reflectance C",
+             rgb conductor.k C|float interface.eta 1.8|rgb reflectance C;float conductor.roughness 0|\
+             float interface.roughness 0|float interface.eta 1.5|spectrum conductor.k \"metal-Cu-k\"",
         ),
-        (MIRRORED, surface("\"dielectric\""), "float eta 1.8|float roughness .2"),
-        (MIRRORED, surface("\"thindielectric\""), "float eta 1.8"),
+        (
+            MIRRORED,
+            surface("\"dielectric\""),
+            "float eta 1.8|float roughness .2;float eta 1.5|float roughness 0",
+        ),
+        (MIRRORED, surface("\"thindielectric\""), "float eta 1.8;float eta 1.5"),
         (
             MIRRORED,
             surface("\"diffusetransmission\""),
-            "rgb reflectance C|rgb transmittance C|float scale .5",
+            "rgb reflectance C|rgb transmittance C|float scale .5;rgb reflectance [.25 .25 .25]|\
+             rgb transmittance [.25 .25 .25]|float scale 1",
         ),
         (
             MIRRORED,
             surface(&format!("\"subsurface\" {coated}")),
-            "float g .5|float eta 1.6|float roughness .2",
+            "float g .5|float eta 1.6|float roughness .2;\
+             float g 0|float eta 1.33|float roughness 0|float scale 1",
         ),
         (MIRRORED, surface("\"subsurface\""), "string name \"Ketchup\"|rgb reflectance C"),
         (
             MIRRORED,
             surface("\"hair\""),
-            "rgb sigma_a C|float eumelanin .5|float pheomelanin .5|rgb reflectance C|float beta_n .5",
+            "rgb sigma_a C|float eumelanin .5|float pheomelanin .5|rgb reflectance C|float beta_n .5;\
+             float eumelanin 1.3|float beta_n .3|float beta_m .3|float eta 1.55|float alpha 2",
         ),
-        (MIRRORED, texture("mix"), "rgb tex1 C|rgb tex2 C|float amount .3"),
-        (MIRRORED, texture("scale"), "rgb tex C|float scale .5"),
+        (MIRRORED, texture("mix"), "rgb tex1 C|rgb tex2 C|float amount .3;float amount .5"),
+        (MIRRORED, texture("scale"), "rgb tex C|float scale .5;rgb tex [1 1 1]|float scale 1"),
         (
             MIRRORED,
             texture("checkerboard"),
-            "rgb tex1 C|rgb tex2 C|float uscale 2|float vscale 2|float udelta .3|float vdelta .3",
+            "rgb tex1 C|rgb tex2 C|float uscale 2|float vscale 2|float udelta .3|float vdelta .3;\
+             rgb tex1 [1 1 1]|rgb tex2 [0 0 0]|float uscale 1|float vscale 1|float udelta 0|float vdelta 0",
         ),
         (
             MIRRORED,
             "Shape \"sphere\" @".to_owned(),
-            "float radius 2|float zmin .5|float zmax .5|float phimax 90|float alpha .5",
+            "float radius 2|float zmin .5|float zmax .5|float phimax 90|float alpha .5;float radius 1|\
+             float zmin -1|float zmax 1|float phimax 360|float alpha 1",
         ),
         (
             MIRRORED,
             "Shape \"disk\" @".to_owned(),
-            "float radius 2|float innerradius .5|float height .5|float phimax 90|float alpha .5",
+            "float radius 2|float innerradius .5|float height .5|float phimax 90|float alpha .5;\
+             float radius 1|float innerradius 0|float height 0|float phimax 360|float alpha 1",
         ),
         (
             MIRRORED,
             "Shape \"cylinder\" @".to_owned(),
-            "float radius 2|float zmin .5|float zmax .5|float phimax 90|float alpha .5",
+            "float radius 2|float zmin .5|float zmax .5|float phimax 90|float alpha .5;float radius 1|\
+             float zmin -1|float zmax 1|float phimax 360|float alpha 1",
         ),
     ];
     for (head, world, parameters) in groups {
-        let mut seen =
-            HashMap::from([(load(&head.replace('@', ""), &world.replace('@', "")).hash, "")]);
-        for parameter in parameters.split('|') {
-            let [kind, name, value] =
-                parameter.trim().splitn(3, ' ').collect::<Vec<_>>().try_into().unwrap();
-            let value = if value == "C" { color } else { value };
-            let stated = format!("\"{kind} {name}\" {value}");
-            let scene = load(&head.replace('@', &stated), &world.replace('@', &stated));
-            let other = seen.insert(scene.hash, parameter);
+        let read = |parameter: &str| {
+            let stated = parameter.trim().splitn(3, ' ').collect::<Vec<_>>();
+            let stated = <[_; 3]>::try_from(stated).map_or(String::new(), |[kind, name, value]| {
+                format!("\"{kind} {name}\" {}", if value == "C" { color } else { value })
+            });
+            load(&head.replace('@', &stated), &world.replace('@', &stated))
+        };
+        let (parameters, defaults) = parameters.split_once(';').unwrap_or((parameters, ""));
+        let plain = read("");
+        for default in defaults.split('|') {
+            let stated = read(default);
+            assert_eq!(warnings(&stated), warnings(&plain), "{head} {world}: {default}");
+            assert_eq!(stated.hash, plain.hash, "{head} {world}: {default}");
+        }
+        let mut seen = HashMap::from([(plain.hash, "")]);
+        for parameter in parameters.split('|').filter(|parameter| !parameter.is_empty()) {
+            let other = seen.insert(read(parameter).hash, parameter);
             assert_eq!(other, None, "{head} {world}: {parameter}");
         }
     }

@@ -645,6 +645,87 @@ fn materials_take_textures_opacity_and_emission() {
     assert!(scene.inputs.contains(&wood));
 }
 
+/// Each line, in the place of that of its key, makes a scene that no other makes; images are inputs.
+#[test]
+fn every_key_of_a_material_counts() {
+    let folder = Folder::new();
+    folder.write("wood.png", png(TEXELS));
+    let of_all = "opacity = 0.5|opacity = T|emission = [1, 1, 1]|emission = T|normal = T|two_sided = false|\
+                  vertex_color = true";
+    let rough = "alpha = 0.3|roughness = T|distribution = \"beckmann\"";
+    for (kind, keys, lines) in [
+        ("diffuse", "reflectance = C", "reflectance = T|reflectance = D"),
+        (
+            "diffuse_transmission",
+            "reflectance = C|transmittance = C",
+            "reflectance = D|reflectance = { texture = \"wood.png\", factor = 0.4 }|transmittance = D",
+        ),
+        (
+            "plastic",
+            "diffuse = C|alpha = 0.2",
+            "diffuse = D|diffuse = T|ior = 1.6|alpha = 0.3|roughness = 0.6|distribution = \"beckmann\"",
+        ),
+        (
+            "conductor",
+            "reflectance = C|alpha = 0.2",
+            "reflectance = D|reflectance = T|anisotropy = 0.5|R",
+        ),
+        (
+            "conductor",
+            "eta = C|k = C|alpha = 0.2",
+            "eta = D|k = D|reflectance = C|reflectance = T|R",
+        ),
+        (
+            "principled",
+            "base_color = C|roughness = 0.4",
+            "base_color = D|base_color = T|roughness = 0.3|roughness = T|metallic = 0.5|metallic = T|\
+             ior = 1.6|specular = 0.5|specular_color = D|coat_weight = 0.5|sheen_color = C|anisotropy = 0.5",
+        ),
+        (
+            "principled",
+            "base_color = C|roughness = 0.4|sheen_color = C",
+            "sheen_color = D|sheen_roughness = 0.4",
+        ),
+        (
+            "principled",
+            "base_color = C|roughness = 0.4|coat_weight = 0.5",
+            "coat_weight = 0.4|coat_roughness = 0.4",
+        ),
+        ("mirror", "reflectance = C", "reflectance = D|reflectance = T"),
+        (
+            "dielectric",
+            "alpha = 0.2",
+            "ior = 1.6|reflectance = C|transmittance = C|transmittance = T|absorption = C|alpha = 0.3|\
+             distribution = \"beckmann\"",
+        ),
+        (
+            "thin_dielectric",
+            "",
+            "ior = 1.6|alpha = 0.3|reflectance = C|transmittance = C|transmittance = T",
+        ),
+    ] {
+        let name = |line: &str| line.split(' ').next().unwrap_or_default().to_owned();
+        let read = |line: &str| {
+            // `alpha` and `roughness` stand for one another.
+            let width = |key: String| if key == "roughness" { "alpha".to_owned() } else { key };
+            let others = keys.split('|').filter(|key| width(name(key)) != width(name(line)));
+            let lines: Vec<_> = others.chain([line]).collect();
+            let lines = lines.join("\n").replace("= C", "= [0.5, 0.5, 0.5]");
+            let lines = lines.replace("= D", "= [0.5, 0.5, 0.4]");
+            let lines = lines.replace("= T", "= { texture = \"wood.png\" }");
+            let text = HEAD.replace("reflectance = [0.5, 0.5, 0.5]", &lines);
+            load(&folder, &text.replace("\"diffuse\"", &format!("\"{kind}\""))).expect(line)
+        };
+        let mut seen = HashSet::from([read("").hash]);
+        for line in format!("{lines}|{of_all}").replace("|R|", &format!("|{rough}|")).split('|') {
+            let scene = read(line);
+            assert!(seen.insert(scene.hash), "{kind}: {line}");
+            let has_image = scene.inputs.iter().any(|input| input.ends_with("wood.png"));
+            assert_eq!(has_image, line.ends_with(['T', '}']), "{kind}: {line}");
+        }
+    }
+}
+
 #[test]
 fn textures_are_placed_by_offset_turn_and_repetitions() {
     let folder = Folder::new();
