@@ -273,6 +273,8 @@ fn energy_is_limited() {
             );
             let value = table.evaluate(outgoing, incident);
             assert_eq!(value, table.evaluate(incident, outgoing));
+            assert_eq!(table.evaluate(outgoing, -incident), Vec3::ZERO);
+            assert_eq!(table.evaluate(-incident, outgoing), Vec3::ZERO);
             albedo += f64::from(value.x) * theta.cos() * theta.sin();
         }
         albedo *= FRAC_PI_2 * TAU / f64::from(points * points);

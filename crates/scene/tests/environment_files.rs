@@ -17,6 +17,7 @@ use fenestra_scene::{
     },
     math::{colour::luminance, frame::direction_from_lat_long},
     picture::RgbImage,
+    texture::Texture,
 };
 use glam::{Vec2, Vec3};
 
@@ -281,6 +282,16 @@ fn damaged_files_are_refused_with_a_reason() {
         let message = refusal(&folder.write(name, bytes));
         assert!(message.contains(expected), "{message}");
     }
+    let subsampled = b"Y\0\x02\0\0\0\0\0\0\0\x01\0\0\0\x01\0\0\0";
+    let place = exr.windows(subsampled.len()).position(|found| found == subsampled).unwrap();
+    let mut twice = exr.clone();
+    (twice[place + 10], twice[place + 14]) = (2, 2);
+    assert!(refusal(&folder.write("twice.exr", twice)).contains("subsampl"));
+    // Textures have shorter sides, and are known by their first bytes.
+    let texture = |bytes: &[u8]| Texture::decode("a", bytes, &mut Vec::new());
+    let message = texture(b"PF\n20000 1\n-1\n").unwrap_err().to_string();
+    assert!(message.contains("1 to 16384 texels a side, found 20000×1"), "{message}");
+    assert!(texture(&[b"#?RGBE", &hdr[10..]].concat()).is_ok());
     let message = refusal(&folder.path().join("missing.hdr"));
     assert!(message.contains("cannot read"), "{message}");
     let path = folder.path().join("normals.exr");

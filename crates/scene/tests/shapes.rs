@@ -2,7 +2,10 @@
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
-use std::{collections::HashMap, f64::consts::PI};
+use std::{
+    collections::HashMap,
+    f64::consts::{PI, TAU},
+};
 
 use fenestra_scene::{Geometry, Scene};
 use glam::{DVec2, DVec3, Vec3};
@@ -214,9 +217,18 @@ fn tubes_have_the_volume_of_their_path() {
     let is_side_or_end = |n: &[f32; 3]| n[0].abs() > 0.999 || (n[0] - lean).abs() < 1e-5;
     assert!(tapered.normals.iter().all(is_side_or_end), "{:?}", tapered.normals);
     // A ring that leaves its plane: the frame has to close.
-    let ring = "radius = 0.1\nclosed = true\nsmooth = 24\n\
-        path = [[1,0.2,0],[0,-0.2,1],[-1,0.2,0],[0,-0.2,-1]]";
-    let (_, characteristic) = check_closed(&shape("tube", ring).unwrap());
+    let ring: Vec<DVec3> = (0..96)
+        .map(|at| TAU * f64::from(at) / 96.0)
+        .map(|turn| DVec3::new(turn.cos(), 0.2 * (2.0 * turn).cos(), turn.sin()))
+        .collect();
+    let length: f64 = (0..96).map(|at| ring[at].distance(ring[(at + 1) % 96])).sum();
+    let path: Vec<String> = ring.iter().map(|point| list(*point)).collect();
+    let keys = format!(
+        "radius = 0.1\nclosed = true\nsegments = 128\nsmooth = 1\npath = [{}]",
+        path.join(",")
+    );
+    let (found, characteristic) = check_closed(&shape("tube", &keys).unwrap());
+    assert_close(found, PI * 0.01 * length, 1e-2);
     assert_eq!(characteristic, 0);
     // The first point may be given again as the last, with its radius.
     for smooth in [1, 8] {
@@ -240,13 +252,17 @@ fn tubes_have_the_volume_of_their_path() {
 
 #[test]
 fn blobs_lie_on_the_surface_and_melt_together() {
-    let ball = shape("blobs", "cells = 48\nballs = [{ at = [1, 2, 3], radius = 0.5 }]").unwrap();
-    let (found, characteristic) = check_closed(&ball);
-    assert_close(found, 4.0 / 3.0 * PI * 0.125, 1e-2);
-    assert_eq!(characteristic, 2);
-    for position in &ball.positions {
-        let radius = Vec3::from_array(*position).distance(Vec3::new(1.0, 2.0, 3.0));
-        assert!((radius - 0.5).abs() < 1e-3, "{radius}");
+    // A capsule of no length is a ball.
+    for to in ["", ", to = [1, 2, 3]"] {
+        let ball = format!("cells = 48\nballs = [{{ at = [1, 2, 3]{to}, radius = 0.5 }}]");
+        let ball = shape("blobs", &ball).unwrap();
+        let (found, characteristic) = check_closed(&ball);
+        assert_close(found, 4.0 / 3.0 * PI * 0.125, 1e-2);
+        assert_eq!(characteristic, 2);
+        for position in &ball.positions {
+            let radius = Vec3::from_array(*position).distance(Vec3::new(1.0, 2.0, 3.0));
+            assert!((radius - 0.5).abs() < 1e-3, "{radius}");
+        }
     }
     let egg = "cells = 64\nballs = [{ at = [0, 0, 0], radius = [0.5, 1.0, 0.25] }]";
     assert_close(check_closed(&shape("blobs", egg).unwrap()).0, PI / 6.0, 2e-2);
@@ -416,6 +432,8 @@ fn impossible_parameters_name_the_key_and_the_value() {
     assert!(message(infinite).ends_with("radius: expected a finite number above 0, found inf"));
     let many = shape("sphere", "radius = 1\nsegments = 1000000");
     assert!(message(many).ends_with("segments: expected 3 to 4096, found 1000000"));
+    let thick = shape("cylinder", "radius = 1\nheight = 0.5\nbevel = 0.3");
+    assert!(message(thick).contains("bevel: expected a number from 0 to 0.25"));
     let fat = shape("torus", "radius = 1\ntube_radius = 1");
     assert!(message(fat).contains("tube_radius: expected less than radius (1), found 1"));
     let flat = shape("lathe", "profile = [[0, 0], [0, 1]]");
@@ -439,6 +457,36 @@ fn impossible_parameters_name_the_key_and_the_value() {
     assert!(message(hollow).contains("expected one to carve from"));
     let ragged = shape("grid", "size = [1, 1]\nheights = [[0, 0], [0]]");
     assert!(message(ragged).contains("expected rows of 2 numbers, found 1"));
+    // The first number of each key.
+    for (kind, keys) in [
+        ("box", "size = [1, 1, 1]|bevel = 0.1|bevel_segments = 2"),
+        ("sphere", "radius = 1|segments = 8"),
+        ("cylinder", "radius = 1|height = 1|bevel = 0.1|segments = 8"),
+        ("cone", "radius = 1|top_radius = 0.5|height = 1|segments = 8"),
+        ("torus", "radius = 1|tube_radius = 0.2|segments = 8|tube_segments = 8"),
+        ("lathe", "profile = [[1, 0], [1, 1]]|smooth = 2|crease_deg = 30|segments = 8"),
+        (
+            "extrude",
+            "outline = [[0, 0], [1, 0], [0, 1]]|depth = 1|bevel = 0.1|bevel_segments = 2|smooth = 2|\
+             crease_deg = 30",
+        ),
+        ("tube", "path = [[0, 0, 0], [0, 1, 0]]|radius = 0.1|smooth = 2|segments = 8"),
+        ("grid", "size = [1, 1]|thickness = 0.1|cells = [2, 2]"),
+        ("blobs", "balls = [{ at = [0, 0, 0], radius = 1 }]|blend = 0.1|cells = 48"),
+    ] {
+        assert!(shape(kind, &keys.replace('|', "\n")).is_ok(), "{kind}");
+        for key in keys.split('|') {
+            let name = key.split(' ').next().unwrap();
+            let start = key.find(|c: char| c.is_ascii_digit()).unwrap();
+            let number = key[start..].split([',', ']']).next().unwrap();
+            let is_count = ["segments", "smooth", "cells"].iter().any(|end| name.ends_with(end));
+            let wrong = if is_count { "1000000" } else { "nan" };
+            let stated = format!("{}{wrong}{}", &key[..start], &key[start + number.len()..]);
+            let found = message(shape(kind, &keys.replace(key, &stated).replace('|', "\n")));
+            let named = if name == "balls" { "at: " } else { &format!(" {name}: ") };
+            assert!(found.contains(named), "{kind}: {found}");
+        }
+    }
 }
 
 /// Asserts that no triangle shows images mirrored, and returns the most and the least stretch: the

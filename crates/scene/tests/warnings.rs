@@ -57,9 +57,12 @@ fn losses_of_many_meshes_are_one_warning() {
 #[test]
 fn a_kind_of_difference_is_one_line() {
     let folder = Folder::new();
-    let text = "[camera]\nposition = [0, 1, 5]\nlook_at = [0, 1, 0]\nvertical_fov_deg = 40\n";
+    let text = "[camera]\nposition = [0, 1, 5]\nlook_at = [0, 1, 0]\nvertical_fov_deg = 40\n\
+                [[portal]]\ncorner = [0, 0, 0]\nfirst_edge = [1, 0, 0]\nsecond_edge = [0, 1, 0]\n";
     let scene = Scene::load(&folder.write("a.toml", text)).unwrap();
     let mut export = gltf::export(&scene, Path::new("a.gltf"));
+    let portals = "portals: left out, 1 in all, `the first` among them";
+    assert!(export.warnings.iter().any(|text| text.contains(portals)), "{:?}", export.warnings);
     let warnings = ["`a`: darker at alpha = 0.3", "`b`: darker at alpha = 0.25", "`b`: brighter"];
     export.warnings = warnings.map(|text| format!("material {text}")).to_vec();
     let first = format!("{} (1 others likewise)", export.warnings[0]);
