@@ -216,7 +216,10 @@ fn tubes_have_the_volume_of_their_path() {
     let lean = -0.05 / 1.0_f32.hypot(0.05);
     let is_side_or_end = |n: &[f32; 3]| n[0].abs() > 0.999 || (n[0] - lean).abs() < 1e-5;
     assert!(tapered.normals.iter().all(is_side_or_end), "{:?}", tapered.normals);
-    // A ring that leaves its plane: the frame has to close.
+    // Rings that leave their plane: the frame has to close.
+    let ring = "radius = 0.1\nclosed = true\nsmooth = 24\n\
+        path = [[1,0.2,0],[0,-0.2,1],[-1,0.2,0],[0,-0.2,-1]]";
+    assert_eq!(check_closed(&shape("tube", ring).unwrap()).1, 0);
     let ring: Vec<DVec3> = (0..96)
         .map(|at| TAU * f64::from(at) / 96.0)
         .map(|turn| DVec3::new(turn.cos(), 0.2 * (2.0 * turn).cos(), turn.sin()))
