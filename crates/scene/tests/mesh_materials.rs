@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
-use std::{collections::HashSet, f32::consts::FRAC_PI_2};
+use std::f32::consts::FRAC_PI_2;
 
 use fenestra_scene::{
     Scene,
@@ -15,6 +15,7 @@ use fenestra_scene::{
 use glam::Vec3;
 
 use crate::support::{
+    assert_each_counts,
     folder::{self, Folder},
     gltf::{Attribute, base64, floats, gltf, gltf_of, png},
 };
@@ -384,17 +385,7 @@ fn every_member_of_a_gltf_file_counts() {
             let text = gltf(nodes, &material, ", \"material\": 0", &rest);
             Scene::load(&folder.write("a.gltf", text)).expect(member)
         };
-        let (members, defaults) = members.split_once(';').unwrap_or((members, ""));
-        let plain = read("");
-        for default in defaults.split('|') {
-            let stated = read(default);
-            assert_eq!(stated.warnings, plain.warnings, "{object}: {default}");
-            assert_eq!(stated.hash, plain.hash, "{object}: {default}");
-        }
-        let mut seen = HashSet::from([plain.hash]);
-        for member in members.split('|') {
-            assert!(seen.insert(read(member).hash), "{object}: {member}");
-        }
+        assert_each_counts(&object, members, read);
     }
 }
 

@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 use std::{
-    collections::HashMap,
     f32::consts::{FRAC_PI_2, PI},
     io::Write,
     path::Path,
@@ -21,7 +20,10 @@ use fenestra_scene::{
 };
 use glam::{Vec2, Vec3};
 
-use crate::support::folder::{BALL, Folder, yard};
+use crate::support::{
+    assert_each_counts,
+    folder::{BALL, Folder, yard},
+};
 
 /// Sensor of 40 × 20 pixels that looks from (0, 0, 5) to the origin.
 const SENSOR: &str = r#"<sensor type="perspective"><float name="fov" value="60"/>
@@ -2160,16 +2162,6 @@ fn every_parameter_counts_and_none_for_another() {
             });
             loaded(&folder.write("a.xml", document(&text.replace('@', &stated))))
         };
-        let (parameters, defaults) = parameters.split_once(';').unwrap_or((parameters, ""));
-        let plain = read("");
-        for default in defaults.split('|') {
-            let stated = read(default);
-            assert_eq!(stated.warnings, plain.warnings, "{text}: {default}");
-            assert_eq!(stated.hash, plain.hash, "{text}: {default}");
-        }
-        let mut seen = HashMap::from([(plain.hash, "")]);
-        for parameter in parameters.split('|') {
-            assert_eq!(seen.insert(read(parameter).hash, parameter), None, "{text}: {parameter}");
-        }
+        assert_each_counts(&text, parameters, read);
     }
 }

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests may panic")]
 
 use std::{
-    collections::{HashMap, HashSet},
+    collections::HashSet,
     f32::consts::{FRAC_PI_2, PI},
     path::Path,
 };
@@ -21,7 +21,7 @@ use fenestra_scene::{
 };
 use glam::{DVec3, Mat3, Vec2, Vec3};
 
-use crate::support::folder::Folder;
+use crate::support::{assert_each_counts, folder::Folder};
 
 /// A triangle at the corners of the axes, counter-clockwise seen from (1, 1, 1).
 const TRIANGLE: &str =
@@ -1894,19 +1894,9 @@ fn every_parameter_counts_and_none_for_another() {
             let stated = <[_; 3]>::try_from(stated).map_or(String::new(), |[kind, name, value]| {
                 format!("\"{kind} {name}\" {}", if value == "C" { color } else { value })
             });
-            load(&head.replace('@', &stated), &world.replace('@', &stated))
+            let scene = load(&head.replace('@', &stated), &world.replace('@', &stated));
+            Scene { warnings: warnings(&scene), ..scene }
         };
-        let (parameters, defaults) = parameters.split_once(';').unwrap_or((parameters, ""));
-        let plain = read("");
-        for default in defaults.split('|') {
-            let stated = read(default);
-            assert_eq!(warnings(&stated), warnings(&plain), "{head} {world}: {default}");
-            assert_eq!(stated.hash, plain.hash, "{head} {world}: {default}");
-        }
-        let mut seen = HashMap::from([(plain.hash, "")]);
-        for parameter in parameters.split('|').filter(|parameter| !parameter.is_empty()) {
-            let other = seen.insert(read(parameter).hash, parameter);
-            assert_eq!(other, None, "{head} {world}: {parameter}");
-        }
+        assert_each_counts(&format!("{head} {world}"), parameters, read);
     }
 }
